@@ -1,0 +1,365 @@
+"""Reading a layout from its text, with errors that name the line and the mend."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from importlib.resources import files
+from pathlib import Path
+from typing import NoReturn
+
+from worlds.errors import LayoutError, UserError
+from worlds.layout import KINDS, SIZES, Appears, Cell, Edge, Kind, Layout, Obstacle, Size, edge
+
+_MARK = re.compile(r"[TGD][A-Za-z0-9_]*")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
+_COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
+_KEYS = ("name", "grid", "start", "trigger", "goal", "chosen", "obstacles")
+_SUFFIX = ".maze"
+
+
+def layout_names() -> tuple[str, ...]:
+    """Return the names of the layouts that come with the package."""
+    found = (entry.name for entry in files("worlds").joinpath("layouts").iterdir())
+    return tuple(sorted(name.removesuffix(_SUFFIX) for name in found if name.endswith(_SUFFIX)))
+
+
+def load_layout(name: str | Path) -> Layout:
+    """Read a layout that comes with the package, by its name, or any ``.maze`` file, by its path.
+
+    Raises
+    ------
+    UserError
+        If there is no such layout or file, or it cannot be read.
+    LayoutError
+        If its text is wrong; the message names the line and the mend.
+
+    Examples
+    --------
+    >>> maze = load_layout("two_rooms")
+    >>> maze.rows, maze.cols, maze.triggers["T4"], sorted(maze.rooms)
+    (8, 8, Cell(row=6, col=1), ['A', 'B'])
+    """
+    if isinstance(name, str) and name in layout_names():
+        text = files("worlds").joinpath("layouts", name + _SUFFIX).read_text(encoding="utf-8")
+        return parse_layout(text, source=name + _SUFFIX)
+    path = Path(name)
+    if not path.is_file():
+        near = get_close_matches(str(name), layout_names(), n=1)
+        hint = f"did you mean {near[0]!r}?" if near else f"layouts by name: {', '.join(layout_names())}"
+        raise UserError(f"{name}: no layout of this name and no such file; {hint}")
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UserError(f"{path}: cannot be read as UTF-8 text ({error}); check the file") from error
+    return parse_layout(text, source=str(path))
+
+
+def parse_layout(text: str, source: str = "layout") -> Layout:
+    """Read a layout from its text; `source` names it in errors.
+
+    Raises
+    ------
+    LayoutError
+        If the text is wrong.
+    """
+    return _Parser(source).parse(text)
+
+
+@dataclass
+class _Parser:
+    source: str
+    lines: dict[str, int] = field(default_factory=dict)  # where each key or mark was read
+    grid: list[tuple[int, list[str]]] = field(default_factory=list)
+    values: dict[str, list[str]] = field(default_factory=dict)
+    marks: dict[str, Cell] = field(default_factory=dict)
+    solid: set[Cell] = field(default_factory=set)
+    walls: set[Edge] = field(default_factory=set)
+    doors: set[Edge] = field(default_factory=set)
+    obstacles: list[Obstacle] = field(default_factory=list)
+
+    def fail(self, line: int | None, problem: str, mend: str) -> NoReturn:
+        raise LayoutError(self.source, line, problem, mend)
+
+    def parse(self, text: str) -> Layout:
+        obstacle_lines = self._split(text)
+        rows, cols = self._read_grid()
+        start = self._cell_of("start", rows, cols)
+        trigger, goal = self._mark_of("trigger", "T"), self._mark_of("goal", "G")
+        for number, words in obstacle_lines:
+            self.obstacles.append(self._obstacle(number, words, rows, cols))
+        layout = Layout(
+            name=" ".join(self.values.get("name", [])) or Path(self.source).stem,
+            rows=rows,
+            cols=cols,
+            solid=frozenset(self.solid),
+            walls=frozenset(self.walls),
+            doors=frozenset(self.doors),
+            triggers=self._marked("T"),
+            goals=self._marked("G"),
+            thresholds=self._marked("D"),
+            start=start,
+            trigger=trigger,
+            goal=goal,
+            obstacles=tuple(self.obstacles),
+            chosen=self._chosen(),
+        )
+        self._check_doors(layout)
+        self._check_reach(layout)
+        self._check_obstacles(layout)
+        return layout
+
+    def _split(self, text: str) -> list[tuple[int, list[str]]]:
+        """Sort lines into the grid, `key value` lines and obstacle lines."""
+        section = ""
+        obstacle_lines = []
+        for number, raw in enumerate(text.splitlines(), start=1):
+            words = [] if raw.lstrip().startswith("#") else raw.split()
+            if not words:
+                continue
+            if words[0] in _KEYS:
+                section = words[0]
+                if section in self.values:
+                    self.fail(
+                        number, f"{section!r} is given twice", f"keep one (first: line {self.lines[section]})"
+                    )
+                self.lines[section] = number
+                self.values[section] = words[1:]
+            elif section == "grid":
+                self.grid.append((number, words))
+            elif section == "obstacles":
+                obstacle_lines.append((number, words))
+            else:
+                near = get_close_matches(words[0], _KEYS, n=1)
+                hint = (
+                    f"did you mean {near[0]!r}?" if near else f"a line begins with one of {', '.join(_KEYS)}"
+                )
+                self.fail(number, f"unknown key {words[0]!r}", hint)
+        return obstacle_lines
+
+    def _read_grid(self) -> tuple[int, int]:
+        if not self.grid:
+            self.fail(self.lines.get("grid"), "the layout has no grid", "add 'grid' and its rows below it")
+        width = 0
+        for row, (number, words) in enumerate(self.grid):
+            col = self._read_row(number, row, words)
+            width = width or col
+            if col != width:
+                self.fail(
+                    number,
+                    f"ragged rows: this row has {col} cells, the first has {width}",
+                    "give every row the same number of cells",
+                )
+        for mark, meaning in (("T", "trigger"), ("G", "goal")):
+            if not self._marked(mark):
+                self.fail(
+                    self.lines["grid"],
+                    f"missing mark: no {meaning} in the grid",
+                    f"mark a cell {mark}1 in place of '.'",
+                )
+        return len(self.grid), width
+
+    def _read_row(self, number: int, row: int, words: list[str]) -> int:
+        """Read one row of the grid and return its number of cells."""
+        col = 0
+        between = ""
+        for word in words:
+            if word in ("|", ":"):
+                if col == 0 or between:
+                    self.fail(
+                        number, f"{word!r} does not stand between two cells", "put a cell on either side"
+                    )
+                between = word
+                continue
+            cell = Cell(row, col)
+            if word == "X":
+                self.solid.add(cell)
+            elif _MARK.fullmatch(word):
+                if word in self.marks:
+                    self.fail(
+                        number,
+                        f"doubled mark {word} (first: line {self.lines[word]})",
+                        "rename or remove one of the two",
+                    )
+                self.marks[word] = cell
+                self.lines[word] = number
+            elif word != ".":
+                self.fail(
+                    number,
+                    f"unknown cell {word!r}",
+                    "write '.', 'X' (solid), or a mark that begins with T, G or D; separate cells by blanks",
+                )
+            if between:
+                (self.walls if between == "|" else self.doors).add(edge(Cell(row, col - 1), cell))
+                between = ""
+            col += 1
+        if between:
+            self.fail(number, f"{between!r} does not stand between two cells", "put a cell on either side")
+        return col
+
+    def _marked(self, letter: str) -> dict[str, Cell]:
+        return {name: self.marks[name] for name in sorted(self.marks) if name.startswith(letter)}
+
+    def _cell(self, number: int, word: str, rows: int, cols: int) -> Cell:
+        if word in self.marks:
+            return self.marks[word]
+        match = re.fullmatch(r"(\d+),(\d+)", word)
+        if match is None:
+            self.fail(
+                number, f"{word!r} is not a cell", "write row,column (such as 3,0) or a mark of the grid"
+            )
+        cell = Cell(int(match[1]), int(match[2]))
+        if cell.row >= rows or cell.col >= cols:
+            self.fail(
+                number,
+                f"cell {cell} is outside the grid of {rows} x {cols}",
+                f"rows run 0 to {rows - 1}, columns 0 to {cols - 1}",
+            )
+        if cell in self.solid:
+            self.fail(number, f"cell {cell} is solid", "choose a free cell")
+        return cell
+
+    def _single(self, key: str) -> tuple[int, str]:
+        if key not in self.values:
+            self.fail(None, f"missing line {key!r}", f"add '{key}' and its value")
+        number, words = self.lines[key], self.values[key]
+        if len(words) != 1:
+            self.fail(number, f"{key!r} takes one value, not {len(words)}", f"write '{key} VALUE'")
+        return number, words[0]
+
+    def _cell_of(self, key: str, rows: int, cols: int) -> Cell:
+        number, word = self._single(key)
+        return self._cell(number, word, rows, cols)
+
+    def _mark_of(self, key: str, letter: str) -> str:
+        number, word = self._single(key)
+        if word not in self._marked(letter):
+            self.fail(
+                number,
+                f"missing mark: {key} {word!r} is not in the grid",
+                f"mark its cell, or name one of {', '.join(self._marked(letter))}",
+            )
+        return word
+
+    def _chosen(self) -> frozenset[str]:
+        known = {*self.marks, *(obstacle.name for obstacle in self.obstacles), "start"}
+        for name in self.values.get("chosen", []):
+            if name not in known:
+                self.fail(
+                    self.lines["chosen"],
+                    f"'chosen' names {name!r}, which the layout does not have",
+                    f"known names: {', '.join(sorted(known))}",
+                )
+        return frozenset(self.values.get("chosen", []))
+
+    def _obstacle(self, number: int, words: list[str], rows: int, cols: int) -> Obstacle:
+        if len(words) < 6:
+            self.fail(
+                number,
+                "an obstacle's line is too short",
+                "write: name kind cell size colour when (S1 sphere 3,0 middle #d9332b at start)",
+            )
+        name, kind, cell, size, colour, *when = words
+        if not _NAME.fullmatch(name) or name in self.lines:
+            self.fail(
+                number, f"obstacle name {name!r} is taken or not a word", "give each obstacle its own name"
+            )
+        self.lines[name] = number
+        return Obstacle(
+            name=name,
+            kind=self._kind(number, kind),
+            cell=self._cell(number, cell, rows, cols),
+            size=self._size(number, size),
+            colour=self._colour(number, colour),
+            appears=self._appears(number, when, rows, cols),
+        )
+
+    def _kind(self, number: int, word: str) -> Kind:
+        for kind in KINDS:
+            if word == kind:
+                return kind
+        self.fail(number, f"unknown obstacle kind {word!r}", _suggest(word, KINDS))
+
+    def _size(self, number: int, word: str) -> Size:
+        for size in SIZES:
+            if word == size:
+                return size
+        self.fail(number, f"unknown size {word!r}", _suggest(word, SIZES))
+
+    def _colour(self, number: int, word: str) -> str:
+        if not _COLOUR.fullmatch(word):
+            self.fail(number, f"{word!r} is not a colour", "write it as #rrggbb, such as #d9332b")
+        return word.lower()
+
+    def _appears(self, number: int, words: list[str], rows: int, cols: int) -> Appears:
+        match words:
+            case ["at", "start"]:
+                return Appears("start")
+            case ["at", "step", step] if step.isdecimal():
+                return Appears("step", step=int(step))
+            case ["when", "robot", cell]:
+                return Appears("robot", cell=self._cell(number, cell, rows, cols))
+            case ["when", "doors", "open"]:
+                return Appears("doors")
+        self.fail(
+            number,
+            f"cannot read when the obstacle appears: {' '.join(words)!r}",
+            "write 'at start', 'at step N', 'when robot R,C' or 'when doors open'",
+        )
+
+    def _check_doors(self, layout: Layout) -> None:
+        """Hold that every door has its grid, and every D mark a door."""
+        for door in sorted(layout.doors):
+            named = [name for name, cell in layout.thresholds.items() if cell in door]
+            if len(named) != 1:
+                self.fail(
+                    self.grid[door[0].row][0],
+                    f"missing mark: the door between {door[0]} and {door[1]} needs one D mark beside it, "
+                    f"and has {len(named)}",
+                    "mark the grid behind the door D1, D2, ...",
+                )
+        for name, cell in layout.thresholds.items():
+            if not any(cell in door for door in layout.doors):
+                self.fail(
+                    self.lines[name], f"{name} is not beside a door", "write ':' between it and its neighbour"
+                )
+
+    def _check_reach(self, layout: Layout) -> None:
+        """Hold that triggers can be reached with doors shut, and goals with doors open."""
+        for marks, doors_open, state in ((layout.triggers, False, "shut"), (layout.goals, True, "open")):
+            reach = layout.reach([layout.start], doors_open=doors_open)
+            for name, cell in marks.items():
+                if cell not in reach:
+                    self.fail(
+                        self.lines[name],
+                        f"unreachable: {name} cannot be reached from start {layout.start} with doors {state}",
+                        "move it, open a wall, or move the start",
+                    )
+        if layout.start == layout.triggers[layout.trigger]:
+            self.fail(
+                self.lines["start"], f"the robot starts on its trigger {layout.trigger}", "start it elsewhere"
+            )
+
+    def _check_obstacles(self, layout: Layout) -> None:
+        """Hold that what appears at the start has room there."""
+        taken: dict[Cell, str] = {layout.start: "the robot"}
+        for obstacle in layout.obstacles:
+            if obstacle.appears.event == "start":
+                number = self.lines[obstacle.name]
+                if obstacle.cell in taken:
+                    self.fail(
+                        number, f"{obstacle.name} appears on {taken[obstacle.cell]}", "move one of the two"
+                    )
+                if obstacle.cell in layout.thresholds.values():
+                    self.fail(
+                        number,
+                        f"{obstacle.name} appears in a door that is shut at the start",
+                        "move it, or let it appear 'when doors open'",
+                    )
+                taken[obstacle.cell] = obstacle.name
+
+
+def _suggest(word: str, known: tuple[str, ...]) -> str:
+    near = get_close_matches(word, known, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
