@@ -1,0 +1,1 @@
+"""Studies that compare learners with the oracle, their figures and reports, and the command line."""
