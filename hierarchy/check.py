@@ -1,0 +1,247 @@
+"""Static validation of a task graph: every finding names the task, the edge and the mend."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from difflib import get_close_matches
+
+import networkx as nx
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
+from hierarchy.grounding import GroundGraph, GroundTask, ground
+from hierarchy.predicates import Param, Predicate, Term, Var
+from worlds import TransitionModel
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One fault of a task graph.
+
+    `where` is a task, or an edge written ``parent -> child``.
+    """
+
+    kind: str
+    where: str
+    problem: str
+    mend: str
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.problem}; {self.mend}"
+
+
+def check(graph: TaskGraph, model: TransitionModel) -> tuple[Finding, ...]:
+    """Return everything that is wrong with a task graph on a world; empty if it may run.
+
+    The declaration is checked first; what needs the world's states (terminations that never hold,
+    children that never run, states without a runnable child, goals out of reach) only once that is clean.
+
+    Examples
+    --------
+    >>> from hierarchy import two_rooms
+    >>> from worlds import load_layout, maze_model
+    >>> maze = load_layout("two_rooms")
+    >>> check(two_rooms(maze), maze_model(maze))
+    ()
+    """
+    findings = tuple(_declaration(graph))
+    return findings or tuple(_behaviour(ground(graph, model)))
+
+
+def checked(graph: TaskGraph, model: TransitionModel) -> GroundGraph:
+    """Ground a task graph that passes `check`.
+
+    Raises
+    ------
+    TaskGraphError
+        If it does not; the message lists every finding.
+    """
+    findings = check(graph, model)
+    if findings:
+        listed = "\n".join(f"  {finding}" for finding in findings)
+        raise TaskGraphError(f"task graph {graph.name} cannot run:\n{listed}")
+    return ground(graph, model)
+
+
+def _declaration(graph: TaskGraph) -> Iterator[Finding]:
+    for task in graph.tasks.values():
+        yield from _predicate(graph, task, task.name, "until", task.until)
+        yield from _predicate(graph, task, task.name, "within", task.within)
+        if not task.do:
+            yield Finding("no children", task.name, "it has nothing to do", "give it children with do=...")
+        for call in task.do:
+            yield from _edge(graph, task, call)
+    structure = graph.networkx()
+    for cycle in nx.simple_cycles(nx.DiGraph(structure)):
+        ring = " -> ".join((*cycle, cycle[0]))
+        yield Finding(
+            "cycle", cycle[0], f"tasks call each other in a ring, {ring}", "remove one of its edges"
+        )
+    used = {graph.root.name} | nx.descendants(structure, graph.root.name)
+    for name in graph.tasks:
+        if name not in used:
+            yield Finding(
+                "unreachable",
+                name,
+                f"no path leads to it from the root {graph.root.name}",
+                "call it, or remove it (the root is the task that is added last)",
+            )
+
+
+def _predicate(graph: TaskGraph, task: Task, where: str, key: str, predicate: Predicate) -> Iterator[Finding]:
+    params = {param.name for param in task.params}
+    for name in sorted(predicate.parameters() - params):
+        yield Finding(
+            "unknown parameter",
+            where,
+            f"{key} ({predicate}) reads parameter {name!r}, which {task.name} does not have",
+            _suggest(name, params, "parameters"),
+        )
+    for name in sorted(predicate.variables()):
+        if name not in graph.index.names:
+            yield Finding(
+                "unknown variable",
+                where,
+                f"{key} ({predicate}) reads {name!r}, which is no state variable of the world",
+                _suggest(name, graph.index.names, "state variables"),
+            )
+        elif name not in task.uses:
+            yield Finding(
+                "hidden variable",
+                where,
+                f"{key} ({predicate}) reads {name!r}, which is not among the relevant variables",
+                f"add {name!r} to the uses of {task.name}",
+            )
+
+
+def _edge(graph: TaskGraph, task: Task, call: Call) -> Iterator[Finding]:
+    where = f"{task.name} -> {call.child}"
+    yield from _predicate(graph, task, where, "when", call.guard)
+    for name in call.relevant or ():
+        if name not in task.uses:
+            yield Finding(
+                "hidden variable",
+                where,
+                f"the edge uses {name!r}, which {task.name} does not",
+                f"add {name!r} to the uses of {task.name}",
+            )
+    if call.child in graph.actions:
+        return
+    if call.child not in graph.tasks:
+        known = (*graph.tasks, *graph.actions)
+        yield Finding(
+            "unknown child",
+            where,
+            f"{call.child!r} is no task or action",
+            _suggest(call.child, known, "children"),
+        )
+        return
+    bound = dict(call.binding)
+    for param in graph.tasks[call.child].params:
+        if param.name not in bound:
+            yield Finding(
+                "unbound parameter",
+                where,
+                f"parameter {param.name!r} is not bound",
+                f"write {call.child}({param.name}=...)",
+            )
+        elif isinstance(term := bound[param.name], Term):
+            yield from _bound_term(graph, task, where, param, term)
+
+
+def _bound_term(graph: TaskGraph, task: Task, where: str, param: Param, term: Term) -> Iterator[Finding]:
+    if isinstance(term, Var) and term.name not in graph.index.names:
+        mend = _suggest(term.name, graph.index.names, "state variables")
+        yield Finding("unknown variable", where, f"{term.name!r} is no state variable of the world", mend)
+    elif isinstance(term, Param) and term not in task.params:
+        mend = _suggest(term.name, [own.name for own in task.params], "parameters")
+        yield Finding("unknown parameter", where, f"{term.name!r} is no parameter of {task.name}", mend)
+    elif not set(term.domain.values) <= set(param.domain.values):
+        yield Finding(
+            "mistyped parameter",
+            where,
+            f"{term.name!r} takes values that {param.name!r} does not",
+            f"give {param.name!r} all of {', '.join(term.domain.labels)}",
+        )
+
+
+def _behaviour(grounded: GroundGraph) -> Iterator[Finding]:
+    reachable = grounded.model.reachable()
+    called = {grounded.root: grounded.model.starts}
+    for place in range(grounded.root, len(grounded.model.actions) - 1, -1):
+        task = grounded.nodes[place]
+        for call in task.calls:
+            called[call.child] = called.get(call.child, np.False_) | (call.available & reachable)
+            if not (call.available & reachable).any():
+                child = grounded.nodes[call.child].name
+                yield Finding(
+                    "never runs",
+                    f"{task.name} -> {child}",
+                    "the child can never run: guard, working space and termination leave no state",
+                    "relax the guard (when), or remove the edge",
+                )
+        yield from _ending(grounded, task, called[place] & task.live, reachable)
+
+
+def _ending(
+    grounded: GroundGraph, task: GroundTask, called: NDArray[np.bool_], reachable: NDArray[np.bool_]
+) -> Iterator[Finding]:
+    """Check that a task ends, can end from wherever it is called, and always has something to do."""
+    if not (task.terminal & reachable).any():
+        problem = f"its termination ({grounded.graph.tasks[task.task].until}) never holds"
+        yield Finding("never ends", task.name, problem, "mend its until")
+        return
+    stuck = task.live & reachable & ~np.logical_or.reduce([call.available for call in task.calls])
+    if stuck.any():
+        yield Finding(
+            "stuck",
+            task.name,
+            f"in {int(stuck.sum())} states it runs but no child can, such as {_describe(grounded, stuck)}",
+            "widen a child's guard (when), or end the task there (until)",
+        )
+    lost = called & ~_can_end(grounded, task)
+    if lost.any():
+        yield Finding(
+            "out of reach",
+            task.name,
+            f"called in {int(lost.sum())} states it cannot end from, such as {_describe(grounded, lost)}",
+            "call it elsewhere (when), widen its working space (within), or mend its until",
+        )
+
+
+def _can_end(grounded: GroundGraph, task: GroundTask) -> NDArray[np.bool_]:
+    """Return the states from which the actions below a task can end it, shape (states,)."""
+    moves = list(_moves(grounded, task))
+    ends = task.terminal.copy()
+    while True:
+        more = ends.copy()
+        for action, available in moves:
+            more |= available & ends[grounded.model.successors[:, action]]
+        if (more == ends).all():
+            return ends
+        ends = more
+
+
+def _moves(grounded: GroundGraph, task: GroundTask) -> Iterator[tuple[int, NDArray[np.bool_]]]:
+    """Yield the primitive actions that a task may come to take, and where."""
+    for call in task.calls:
+        child = grounded.nodes[call.child]
+        if child.calls:
+            yield from _moves(grounded, child)
+        else:
+            yield call.child, call.available
+
+
+def _describe(grounded: GroundGraph, mask: NDArray[np.bool_]) -> str:
+    index = grounded.model.index
+    state = index.state(int(np.flatnonzero(mask)[0]))
+    words = (f"{v.name} = {v.label(value)}" for v, value in zip(index.variables, state, strict=True))
+    return ", ".join(words)
+
+
+def _suggest(name: str, known: Iterable[str], what: str) -> str:
+    names = sorted(known)
+    near = get_close_matches(name, names, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"known {what}: {', '.join(names) or 'none'}"

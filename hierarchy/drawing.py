@@ -1,0 +1,64 @@
+"""Drawing a task graph: Mermaid text, and a networkx graph ready for a picture."""
+
+from __future__ import annotations
+
+import networkx as nx
+
+from hierarchy.graph import TaskGraph
+from hierarchy.predicates import ALWAYS
+
+
+def mermaid(graph: TaskGraph) -> str:
+    r"""Return the task graph as a Mermaid flowchart; edges carry bindings and guards.
+
+    Examples
+    --------
+    >>> from hierarchy import two_rooms
+    >>> from worlds import load_layout
+    >>> print(*mermaid(two_rooms(load_layout("two_rooms"))).splitlines()[:4], sep="\n")
+    flowchart TD
+        Root(["Root"])
+        GotoTrigger["GotoTrigger(target)"]
+        GotoDoor["GotoDoor(target)"]
+    """
+    lines = ["flowchart TD"]
+    tasks = sorted(graph.tasks.values(), key=lambda task: task.name != graph.root.name)
+    for task in tasks:
+        params = ", ".join(param.name for param in task.params)
+        label = f"{task.name}({params})" if params else task.name
+        box = f'(["{label}"])' if task.name == graph.root.name else f'["{label}"]'
+        lines.append(f"    {task.name}{box}")
+    lines += [f"    {action}{{{{{action}}}}}" for action in graph.actions]
+    for task in tasks:
+        for call in task.do:
+            bound = ", ".join(f"{name}={value}" for name, value in call.binding)
+            guard = "" if call.guard == ALWAYS else f"when {call.guard}"
+            label = "<br>".join(part for part in (bound, guard) if part)
+            arrow = f'-- "{label}" -->' if label else "-->"
+            lines.append(f"    {task.name} {arrow} {call.child}")
+    return "\n".join(lines) + "\n"
+
+
+def task_graph_picture(graph: TaskGraph) -> nx.DiGraph[str]:
+    """Return the task graph with one node for each call of a task, labelled for drawing.
+
+    Nodes have attributes ``label`` and ``kind`` (root, task or action); edges have ``label``.
+    """
+    picture: nx.DiGraph[str] = nx.DiGraph(name=graph.name)
+    root = graph.root.name
+    picture.add_node(root, label=root, kind="root")
+    for action in graph.actions:
+        picture.add_node(action, label=action, kind="action")
+    stack = [(root, root)]
+    while stack:
+        node, name = stack.pop()
+        for call in graph.tasks[name].do:
+            if call.child in graph.actions:
+                picture.add_edge(node, call.child, label="")
+                continue
+            child = str(call)
+            if child not in picture:
+                picture.add_node(child, label=child, kind="task")
+                stack.append((child, call.child))
+            picture.add_edge(node, child, label="" if call.guard == ALWAYS else f"when {call.guard}")
+    return picture

@@ -1,0 +1,328 @@
+"""Predicates over state variables and parameters, as data.
+
+A predicate prints as it is meant, compares equal to another of the same meaning and form, knows what it
+reads, and evaluates on one state or on all states at once.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from worlds import StateIndex, Variable
+
+Values = Mapping[str, Hashable]
+"""A state, or a binding, by name."""
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A fixed value and the word for it."""
+
+    value: Hashable
+    label: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return self.label or str(self.value)
+
+
+@dataclass(frozen=True)
+class ValueSet:
+    """A named set of values, such as the cells of a room."""
+
+    name: str
+    values: frozenset[Hashable]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class Term(ABC):
+    """Something with a name and a finite domain, that predicates compare."""
+
+    @property
+    @abstractmethod
+    def domain(self) -> Variable:
+        """The term's name, values and labels."""
+
+    @property
+    def name(self) -> str:
+        """The term's name."""
+        return self.domain.name
+
+    def __str__(self) -> str:
+        return self.name
+
+    def eq(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term equals another, or a value.
+
+        Raises
+        ------
+        ValueError
+            If the value is not in this term's domain.
+        """
+        return Equal(self, other if isinstance(other, Term) else self.constant(other))
+
+    def isin(self, values: ValueSet | Iterable[Hashable]) -> Predicate:
+        """Return the predicate that this term's value is one of `values`.
+
+        Raises
+        ------
+        ValueError
+            If one of them is not in this term's domain.
+        """
+        if not isinstance(values, ValueSet):
+            chosen = frozenset(values)
+            words = [self.domain.label(value) for value in self.domain.values if value in chosen]
+            values = ValueSet("{" + ", ".join(words) + "}", chosen)
+        for value in values.values:
+            self.constant(value)
+        return Member(self, values)
+
+    def constant(self, value: Hashable) -> Constant:
+        """Return a value of this term's domain with its label."""
+        if value not in self.domain:
+            raise ValueError(
+                f"{value!r} is not a value of {self.name!r}; its values are {', '.join(self.domain.labels)}"
+            )
+        return Constant(value, self.domain.label(value))
+
+
+@dataclass(frozen=True)
+class Var(Term):
+    """A state variable, as predicates and bindings name it."""
+
+    variable: Variable
+
+    @property
+    def domain(self) -> Variable:
+        """The state variable itself."""
+        return self.variable
+
+    __str__ = Term.__str__
+
+
+@dataclass(frozen=True)
+class Param(Term):
+    """A parameter of a task.
+
+    Examples
+    --------
+    >>> door = Param.over("door", {"D1": (2, 4), "D2": (5, 4)})
+    >>> print(door, door.domain.labels)
+    door ('D1', 'D2')
+    """
+
+    parameter: Variable
+
+    @classmethod
+    def over(cls, name: str, values: Mapping[str, Hashable]) -> Param:
+        """Return a parameter that ranges over labelled values."""
+        return cls(Variable(name, tuple(values.values()), tuple(values)))
+
+    @property
+    def domain(self) -> Variable:
+        """The parameter's name, values and labels."""
+        return self.parameter
+
+    __str__ = Term.__str__
+
+
+class Predicate(ABC):
+    """A condition over state variables and parameters."""
+
+    @abstractmethod
+    def terms(self) -> Iterator[Term]:
+        """Yield every variable and parameter that the predicate reads."""
+
+    @abstractmethod
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        """Return the predicate with parameters replaced by values."""
+
+    @abstractmethod
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        """Return where the predicate holds, shape (states,); every parameter must be bound."""
+
+    @abstractmethod
+    def holds(self, values: Values) -> bool:
+        """Return whether the predicate holds for a state, and a binding, given by name."""
+
+    def variables(self) -> frozenset[str]:
+        """Return the names of the state variables that the predicate reads."""
+        return frozenset(term.name for term in self.terms() if isinstance(term, Var))
+
+    def parameters(self) -> frozenset[str]:
+        """Return the names of the parameters that the predicate reads."""
+        return frozenset(term.name for term in self.terms() if isinstance(term, Param))
+
+    def __and__(self, other: Predicate) -> Predicate:
+        return AllOf((*_parts(self, AllOf), *_parts(other, AllOf)))
+
+    def __or__(self, other: Predicate) -> Predicate:
+        return AnyOf((*_parts(self, AnyOf), *_parts(other, AnyOf)))
+
+    def __invert__(self) -> Predicate:
+        return self.inner if isinstance(self, Not) else Not(self)
+
+    def __bool__(self) -> bool:
+        raise TypeError("a predicate is data, not a truth value; combine predicates with &, | and ~")
+
+
+@dataclass(frozen=True)
+class Equal(Predicate):
+    """A term equals another term or a value."""
+
+    left: Term
+    right: Term | Constant
+
+    def __str__(self) -> str:
+        return f"{self.left} = {self.right}"
+
+    def terms(self) -> Iterator[Term]:
+        yield self.left
+        if isinstance(self.right, Term):
+            yield self.right
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        left, right = _bound(self.left, binding), _bound(self.right, binding)
+        if isinstance(left, Constant):
+            if isinstance(right, Constant):
+                return AllOf(()) if left == right else AnyOf(())
+            left, right = right, left
+        return Equal(left, right)
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        if isinstance(self.right, Constant):
+            domain = index.variable(self.left.name)
+            if self.right.value not in domain:
+                return np.zeros(index.size, dtype=np.bool_)
+            return np.equal(index.column(self.left.name), domain.position(self.right.value))
+        codes: dict[Hashable, int] = {}
+        left, right = (
+            np.array([codes.setdefault(v, len(codes)) for v in term.domain.values])[index.column(term.name)]
+            for term in (self.left, self.right)
+        )
+        same: NDArray[np.bool_] = left == right
+        return same
+
+    def holds(self, values: Values) -> bool:
+        right = self.right.value if isinstance(self.right, Constant) else values[self.right.name]
+        return bool(values[self.left.name] == right)
+
+
+@dataclass(frozen=True)
+class Member(Predicate):
+    """A term's value is in a set."""
+
+    left: Term
+    right: ValueSet
+
+    def __str__(self) -> str:
+        return f"{self.left} in {self.right}"
+
+    def terms(self) -> Iterator[Term]:
+        yield self.left
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        left = _bound(self.left, binding)
+        if isinstance(left, Constant):
+            return AllOf(()) if left.value in self.right.values else AnyOf(())
+        return replace(self, left=left)
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        member = np.array([value in self.right.values for value in index.variable(self.left.name).values])
+        mask: NDArray[np.bool_] = member[index.column(self.left.name)]
+        return mask
+
+    def holds(self, values: Values) -> bool:
+        return values[self.left.name] in self.right.values
+
+
+@dataclass(frozen=True)
+class Not(Predicate):
+    """A predicate does not hold."""
+
+    inner: Predicate
+
+    def __str__(self) -> str:
+        return f"not ({self.inner})"
+
+    def terms(self) -> Iterator[Term]:
+        yield from self.inner.terms()
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        return Not(self.inner.bind(binding))
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        return ~self.inner.mask(index)
+
+    def holds(self, values: Values) -> bool:
+        return not self.inner.holds(values)
+
+
+@dataclass(frozen=True)
+class _Joined(Predicate):
+    """Several predicates under one connective."""
+
+    parts: tuple[Predicate, ...]
+
+    def terms(self) -> Iterator[Term]:
+        for part in self.parts:
+            yield from part.terms()
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        return replace(self, parts=tuple(part.bind(binding) for part in self.parts))
+
+    def _write(self, word: str, empty: str) -> str:
+        texts = [f"({p})" if isinstance(p, _Joined) and p.parts else str(p) for p in self.parts]
+        return f" {word} ".join(texts) if texts else empty
+
+
+@dataclass(frozen=True)
+class AllOf(_Joined):
+    """Every part holds; with no parts, always."""
+
+    def __str__(self) -> str:
+        return self._write("and", "always")
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        mask = np.ones(index.size, dtype=np.bool_)
+        for part in self.parts:
+            mask &= part.mask(index)
+        return mask
+
+    def holds(self, values: Values) -> bool:
+        return all(part.holds(values) for part in self.parts)
+
+
+@dataclass(frozen=True)
+class AnyOf(_Joined):
+    """Some part holds; with no parts, never."""
+
+    def __str__(self) -> str:
+        return self._write("or", "never")
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        mask = np.zeros(index.size, dtype=np.bool_)
+        for part in self.parts:
+            mask |= part.mask(index)
+        return mask
+
+    def holds(self, values: Values) -> bool:
+        return any(part.holds(values) for part in self.parts)
+
+
+ALWAYS: Predicate = AllOf(())
+"""The predicate that holds everywhere."""
+
+
+def _parts(predicate: Predicate, kind: type[_Joined]) -> tuple[Predicate, ...]:
+    return predicate.parts if isinstance(predicate, kind) else (predicate,)
+
+
+def _bound(term: Term | Constant, binding: Mapping[str, Constant]) -> Term | Constant:
+    return binding.get(term.name, term) if isinstance(term, Param) else term
