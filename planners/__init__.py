@@ -3,6 +3,7 @@
 from planners.affordance import Affordance, LocalRule, Replanning, Strategy
 from planners.fields import UNREACHED, Field, certify, distance_field, flat_field, task_field
 from planners.maxq import EpisodeTooLongError, MaxQ, Settings
+from planners.proof import Proof, prove
 from planners.recursive import NEVER, Gap, Solution, gap, recursive_optimum
 from planners.schedules import Exploration, LearningRate
 from planners.search import Area, Plan, Replanner, verify
@@ -20,6 +21,7 @@ __all__ = [
     "LocalRule",
     "MaxQ",
     "Plan",
+    "Proof",
     "Replanner",
     "Replanning",
     "Settings",
@@ -29,6 +31,7 @@ __all__ = [
     "distance_field",
     "flat_field",
     "gap",
+    "prove",
     "recursive_optimum",
     "task_field",
     "verify",

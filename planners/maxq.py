@@ -6,7 +6,7 @@ V(i, s) = max_a Q(i, s, a) and Q(i, s, a) = V(a, s) + C(i, s, a) (equations 2 an
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from hierarchy import GroundGraph
@@ -115,17 +115,25 @@ class MaxQ:
         least = max(values) - self.settings.tie
         return next(k for k, value in zip(choices, values, strict=True) if value >= least)
 
-    def train(self, task: int, starts: Sequence[int], episodes: int) -> list[int]:
+    def train(
+        self,
+        task: int,
+        starts: Sequence[int],
+        episodes: int,
+        after_each: Callable[[], None] | None = None,
+    ) -> list[int]:
         """Run episodes of a task, each from a random one of `starts`; return their primitive steps.
 
         The task's rate and exploration start afresh, as each of figure 12's curves does; what it and its
-        children have learnt stays.
+        children have learnt stays. `after_each` is called after every episode, to take a measurement.
         """
         self.episodes[task] = 0
         counts = []
         for _ in range(episodes):
             self._limit = self.steps + self.settings.max_steps
             counts.append(self.run(task, self._random.choose(starts))[0])
+            if after_each is not None:
+                after_each()
         return counts
 
     def run(self, task: int, state: int, caller_rate: float = 1.0) -> tuple[int, int]:

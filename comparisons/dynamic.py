@@ -1,0 +1,134 @@
+"""The dynamic part (section 6.3): the example run of table 4, and random episodes held to the oracle."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from comparisons.robot import Encounter, Run
+from planners import LocalRule, Proof, Replanner, prove
+from worlds import Episode, Layout, Outcome, Stream
+from worlds.appearing import random_obstacles, shortest_way
+
+MOST_OBSTACLES = 6
+
+
+def random_episode(layout: Layout, seed: int, number: int) -> tuple[Episode, str, str]:
+    """Return random episode `number` of a seed, and its pair: random pair, start, and obstacles on the way.
+
+    One to six obstacles; none appears on the start, the trigger or the goal.
+
+    Examples
+    --------
+    >>> from worlds import load_layout
+    >>> episode, trigger, goal = random_episode(load_layout("two_rooms"), seed=1, number=0)
+    >>> 1 <= len(episode.obstacles) <= 6
+    True
+    """
+    stream = Stream(seed, number)
+    trigger, goal = stream.choose(list(layout.triggers)), stream.choose(list(layout.goals))
+    marks = layout.triggers[trigger], layout.goals[goal]
+    start = stream.choose(sorted(layout.room(layout.start) - {marks[0]}))
+    way = shortest_way(layout, start, *marks)
+    count = 1 + stream.below(MOST_OBSTACLES)
+    obstacles = random_obstacles(layout, stream, count, way, frozenset({start, *marks}))
+    return Episode(layout, trigger, goal, start, obstacles), trigger, goal
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One affordance, held to the oracle under what the robot knew.
+
+    Parameters
+    ----------
+    encounter
+        The obstacle, the subtask and the belief.
+    local
+        The proof about the paper's local rule: about its affordance, or its route's first action; None
+        where the rule has no action at all.
+    replanned
+        The proof about the affordance under replanning.
+    """
+
+    encounter: Encounter
+    local: Proof | None
+    replanned: Proof
+
+
+def judge(oracle: Replanner, local: LocalRule, encounter: Encounter) -> Verdict | None:
+    """Hold one affordance to the oracle, and ask the local rule in the same situation.
+
+    None where the subtask has no way left, so that the obstacle affords nothing in it.
+    """
+    task, belief = encounter.task, encounter.belief
+    action = encounter.affordance.action
+    replanned = None if action is None else prove(oracle, task, belief, action)
+    if replanned is None:
+        return None
+    answer = local.affordance(task, encounter.cell, belief)
+    choice = answer.action
+    if not answer.on_route:
+        route = local.route(task, belief)
+        choice = None if route is None else route[0]
+    return Verdict(encounter, None if choice is None else prove(oracle, task, belief, choice), replanned)
+
+
+@dataclass
+class Tally:
+    """What the random episodes came to.
+
+    Parameters
+    ----------
+    outcomes
+        Episodes by the name of their end.
+    verdicts
+        The affordances of obstacles on the route that have a way left.
+    boxed_in
+        Those that have none: the subtask is given up, and the root chooses anew.
+    steps
+        Primitive steps in all.
+    looks, misread
+        Looks ahead, and those that told a wrong shape or distance.
+    """
+
+    episodes: int = 0
+    outcomes: Counter[Outcome] = field(default_factory=Counter)
+    verdicts: list[Verdict] = field(default_factory=list)
+    boxed_in: int = 0
+    steps: int = 0
+    looks: int = 0
+    misread: int = 0
+
+    def add(self, run: Run, verdicts: Iterable[Verdict | None]) -> None:
+        """Count one episode."""
+        self.episodes += 1
+        self.outcomes[run.outcome] += 1
+        self.steps += run.steps
+        self.looks += run.looks
+        self.misread += run.misread
+        for verdict in verdicts:
+            if verdict is None:
+                self.boxed_in += 1
+            else:
+                self.verdicts.append(verdict)
+
+    @property
+    def local_optimal(self) -> int:
+        """Affordances in which the local rule's action is proved optimal."""
+        return sum(v.local is not None and v.local.optimal for v in self.verdicts)
+
+    @property
+    def replanned_optimal(self) -> int:
+        """Affordances in which replanning's action is proved optimal."""
+        return sum(v.replanned.optimal for v in self.verdicts)
+
+    def counterexample(self) -> Verdict | None:
+        """Return a verdict that refutes the local rule, the one with the fewest known obstacles."""
+        refuted = [v for v in self.verdicts if v.local is not None and not v.local.optimal]
+        return min(refuted, key=_known_obstacles, default=None)
+
+
+def _known_obstacles(verdict: Verdict) -> int:
+    belief = verdict.encounter.belief
+    return len(belief.cubes | belief.spheres)
