@@ -123,6 +123,15 @@ class Tally:
         """Affordances in which replanning's action is proved optimal."""
         return sum(v.replanned.optimal for v in self.verdicts)
 
+    def globally_optimal(self, oracle: Replanner) -> int:
+        """Count replanning's affordances that also begin a shortest way of the whole task."""
+        root = oracle.grounded.root
+        plans = (oracle.plan(root, verdict.encounter.belief) for verdict in self.verdicts)
+        return sum(
+            plan is not None and verdict.replanned.action in plan.first_actions
+            for plan, verdict in zip(plans, self.verdicts, strict=True)
+        )
+
     def counterexample(self) -> Verdict | None:
         """Return a verdict that refutes the local rule, the one with the fewest known obstacles."""
         refuted = [v for v in self.verdicts if v.local is not None and not v.local.optimal]

@@ -100,7 +100,7 @@ class PairLearner:
 
     def step_table(self, task: str) -> Table:
         """Return the greedy policy's steps from every grid of a subtask's room (figure 13)."""
-        place, room = self.grounded.place(task), self._room(task)
+        place, room = self.grounded.place(task), self.room(task)
         rows = sorted({cell.row for cell in room})
         cols = sorted({cell.col for cell in room})
         doors = self._doors(task)
@@ -125,7 +125,7 @@ class PairLearner:
         for task in self.subtasks():
             place, doors = self.grounded.place(task), self._doors(task)
             distance = task_field(self.grounded.model, self.grounded.nodes[place]).distance
-            for cell in self._room(task):
+            for cell in self.room(task):
                 at = self.state(cell, doors)
                 if distance[at] != UNREACHED:
                     wrong += self.learner.greedy_steps(place, at) != distance[at]
@@ -141,7 +141,8 @@ class PairLearner:
     def _states(self, cells: frozenset[Cell], doors: str) -> list[int]:
         return [self.state(cell, doors) for cell in sorted(cells)]
 
-    def _room(self, task: str) -> frozenset[Cell]:
+    def room(self, task: str) -> frozenset[Cell]:
+        """Return the room that a subtask works in."""
         return self.second if task.startswith("GotoGoal") else self.first
 
     def _doors(self, task: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib.resources import files
@@ -16,7 +17,9 @@ _MARK = re.compile(r"[TGD][A-Za-z0-9_]*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _KEYS = ("name", "grid", "start", "trigger", "goal", "chosen", "obstacles")
+_HEADINGS = ("grid", "obstacles")  # keys whose lines stand below them
 _SUFFIX = ".maze"
+_OBSTACLE_WORDS = 6  # name, kind, cell, size, colour, and when it appears in one word or more
 
 
 def layout_names() -> tuple[str, ...]:
@@ -113,7 +116,7 @@ class _Parser:
     def _split(self, text: str) -> list[tuple[int, list[str]]]:
         """Sort lines into the grid, `key value` lines and obstacle lines."""
         section = ""
-        obstacle_lines = []
+        obstacle_lines: list[tuple[int, list[str]]] = []
         for number, raw in enumerate(text.splitlines(), start=1):
             words = [] if raw.lstrip().startswith("#") else raw.split()
             if not words:
@@ -124,18 +127,16 @@ class _Parser:
                     self.fail(
                         number, f"{section!r} is given twice", f"keep one (first: line {self.lines[section]})"
                     )
+                if section in _HEADINGS and words[1:]:
+                    self.fail(
+                        number, f"{section!r} stands alone on its line", "move the rest to the lines below it"
+                    )
                 self.lines[section] = number
                 self.values[section] = words[1:]
-            elif section == "grid":
-                self.grid.append((number, words))
-            elif section == "obstacles":
-                obstacle_lines.append((number, words))
+            elif section in _HEADINGS and not _misspelt_key(words, section):
+                (self.grid if section == "grid" else obstacle_lines).append((number, words))
             else:
-                near = get_close_matches(words[0], _KEYS, n=1)
-                hint = (
-                    f"did you mean {near[0]!r}?" if near else f"a line begins with one of {', '.join(_KEYS)}"
-                )
-                self.fail(number, f"unknown key {words[0]!r}", hint)
+                self.fail(number, f"unknown key {words[0]!r}", suggest(words[0], _KEYS))
         return obstacle_lines
 
     def _read_grid(self) -> tuple[int, int]:
@@ -254,7 +255,7 @@ class _Parser:
         return frozenset(self.values.get("chosen", []))
 
     def _obstacle(self, number: int, words: list[str], rows: int, cols: int) -> Obstacle:
-        if len(words) < 6:
+        if len(words) < _OBSTACLE_WORDS:
             self.fail(
                 number,
                 "an obstacle's line is too short",
@@ -279,13 +280,13 @@ class _Parser:
         for kind in KINDS:
             if word == kind:
                 return kind
-        self.fail(number, f"unknown obstacle kind {word!r}", _suggest(word, KINDS))
+        self.fail(number, f"unknown obstacle kind {word!r}", suggest(word, KINDS))
 
     def _size(self, number: int, word: str) -> Size:
         for size in SIZES:
             if word == size:
                 return size
-        self.fail(number, f"unknown size {word!r}", _suggest(word, SIZES))
+        self.fail(number, f"unknown size {word!r}", suggest(word, SIZES))
 
     def _colour(self, number: int, word: str) -> str:
         if not _COLOUR.fullmatch(word):
@@ -360,6 +361,23 @@ class _Parser:
                 taken[obstacle.cell] = obstacle.name
 
 
-def _suggest(word: str, known: tuple[str, ...]) -> str:
-    near = get_close_matches(word, known, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(known)}"
+def _misspelt_key(words: list[str], section: str) -> bool:
+    """Return whether a line among the grid's rows or the obstacles is rather a key with a slip in it."""
+    if section == "grid":
+        fits = words[0] in (".", "X", "|", ":") or _MARK.fullmatch(words[0]) is not None
+    else:
+        fits = len(words) >= _OBSTACLE_WORDS
+    return not fits and bool(get_close_matches(words[0], _KEYS, n=1))
+
+
+def suggest(word: str, known: Iterable[str]) -> str:
+    """Return a mend for an unknown word: the nearest known one, or all of them.
+
+    Examples
+    --------
+    >>> suggest("spere", KINDS), suggest("pyramid", KINDS)
+    ("did you mean 'sphere'?", 'use one of cube, sphere')
+    """
+    words = tuple(known)
+    near = get_close_matches(word, words, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(words)}"

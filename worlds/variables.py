@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +52,7 @@ class Variable:
             raise ValueError(
                 f"variable {self.name!r} has {len(self.values)} values but {len(self.labels)} labels"
             )
-        object.__setattr__(self, "_positions", MappingProxyType(positions))
+        object.__setattr__(self, "_positions", positions)
 
     def __len__(self) -> int:
         return len(self.values)
