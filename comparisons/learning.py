@@ -128,7 +128,7 @@ class PairLearner:
             for cell in self.room(task):
                 at = self.state(cell, doors)
                 if distance[at] != UNREACHED:
-                    wrong += self.learner.greedy_steps(place, at) != distance[at]
+                    wrong += self.learner.greedy_steps(place, at) != int(distance[at])
         return wrong
 
     def wrong_starts(self) -> int:
@@ -136,7 +136,7 @@ class PairLearner:
         root = self.grounded.root
         best = flat_field(self.grounded.model, self.grounded.nodes[root].terminal).distance
         starts = self._states(self.first - {self.layout.triggers[self.trigger]}, "closed")
-        return sum(self.learner.greedy_steps(root, at) != best[at] for at in starts)
+        return sum(self.learner.greedy_steps(root, at) != int(best[at]) for at in starts)
 
     def _states(self, cells: frozenset[Cell], doors: str) -> list[int]:
         return [self.state(cell, doors) for cell in sorted(cells)]

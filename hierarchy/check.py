@@ -67,6 +67,14 @@ def checked(graph: TaskGraph, model: TransitionModel) -> GroundGraph:
 
 def _declaration(graph: TaskGraph) -> Iterator[Finding]:
     for task in graph.tasks.values():
+        for name in task.uses:
+            if name not in graph.index.names:
+                yield Finding(
+                    "unknown variable",
+                    task.name,
+                    f"it uses {name!r}, which is no state variable of the world",
+                    _suggest(name, graph.index.names, "state variables"),
+                )
         yield from _predicate(graph, task, task.name, "until", task.until)
         yield from _predicate(graph, task, task.name, "within", task.within)
         if not task.do:

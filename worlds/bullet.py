@@ -17,22 +17,25 @@ from worlds.layout import Kind, Size
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Throw away what C code writes to the standard output meanwhile.
+    """Throw away what C code writes to standard output and standard error meanwhile.
 
     PyBullet prints when it is imported and when it connects; a command must print only its own text.
     """
     libc = ctypes.CDLL(None)
     sys.stdout.flush()
+    sys.stderr.flush()
     libc.fflush(None)
-    kept = os.dup(1)
+    kept = {stream: os.dup(stream) for stream in (1, 2)}
     nowhere = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        for stream in kept:
+            os.dup2(nowhere, stream)
         yield
     finally:
         libc.fflush(None)  # C keeps its own buffer, which would come out later otherwise
-        os.dup2(kept, 1)
-        os.close(kept)
+        for stream, copy in kept.items():
+            os.dup2(copy, stream)
+            os.close(copy)
         os.close(nowhere)
 
 
