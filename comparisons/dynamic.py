@@ -132,12 +132,18 @@ class Tally:
             for plan, verdict in zip(plans, self.verdicts, strict=True)
         )
 
+    def local_rule_by(self) -> dict[str, tuple[int, int]]:
+        """Return by shape and distance how often the local rule was asked, and proved optimal."""
+        asked = Counter(_situation(verdict) for verdict in self.verdicts)
+        optimal = Counter(_situation(v) for v in self.verdicts if v.local is not None and v.local.optimal)
+        return {situation: (asked[situation], optimal[situation]) for situation in sorted(asked)}
+
     def counterexample(self) -> Verdict | None:
-        """Return a verdict that refutes the local rule, the one with the fewest known obstacles."""
+        """Return a verdict that refutes the local rule: a near obstacle, and few that are known."""
         refuted = [v for v in self.verdicts if v.local is not None and not v.local.optimal]
-        return min(refuted, key=_known_obstacles, default=None)
+        return min(refuted, key=lambda v: (v.encounter.distance, v.encounter.known), default=None)
 
 
-def _known_obstacles(verdict: Verdict) -> int:
-    belief = verdict.encounter.belief
-    return len(belief.cubes | belief.spheres)
+def _situation(verdict: Verdict) -> str:
+    met = verdict.encounter
+    return f"{met.affordance.shape}, {met.distance} ahead"

@@ -31,9 +31,9 @@ def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -
     Parameters
     ----------
     curves
-        Per panel, in order: the steps of every training episode, or a mapping with ``training`` and
-        ``greedy`` (the learnt policy without exploration). A shorter curve is spread over the
-        episodes of the longest.
+        Per panel, in order: the steps of every training episode, or a mapping with ``training``, its
+        running ``median`` and ``greedy`` (the learnt policy without exploration). A shorter curve is
+        spread over the episodes of the longest.
     optima
         Per panel, the fewest possible steps; drawn dashed.
 
@@ -69,8 +69,16 @@ def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -
 
 def _draw_curves(axes: Axes, curves: Mapping[str, Sequence[float]], optimum: int | None) -> None:
     looks: dict[str, Look] = {
-        "training": {"color": SKY, "linewidth": 0.5, "alpha": 0.75, "label": "training episodes"},
-        "greedy": {"color": BLUE, "linewidth": 1.3, "label": "greedy policy"},
+        "training": {
+            "color": SKY,
+            "linestyle": "",
+            "marker": ".",
+            "markersize": 1.6,
+            "alpha": 0.5,
+            "label": "training episodes",
+        },
+        "median": {"color": BLUE, "linewidth": 1.3, "label": "their running median"},
+        "greedy": {"color": INK, "linewidth": 0.9, "label": "greedy policy"},
     }
     longest = max(len(curve) for curve in curves.values())
     for name, curve in curves.items():

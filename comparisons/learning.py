@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 from hierarchy import GroundGraph
-from planners import UNREACHED, MaxQ, flat_field, task_field
+from planners import MaxQ, flat_field, task_field
 from worlds import Cell, Layout
 
 EPISODES: Final = 1200
@@ -42,9 +41,9 @@ class Curve:
 class PairLearner:
     """Learns one (trigger, goal) pair, the subtasks first and the root last.
 
-    GotoTrigger and each GotoDoor learn from random grids of their room. GotoGoal learns from D1 and then
-    from D2, as figure 12 (d) and (e) do, and at last from random grids of its room: from the doors alone
-    the far grids of the room are visited too seldom for figure 13 (d) to come out.
+    Each subtask learns from the grid that figure 12 measures it from: GotoTrigger from the start,
+    GotoDoor from the trigger, GotoGoal from D1 and then from D2. Then it learns from random grids of its
+    room: from one grid alone, those far off the way are visited too seldom for figure 13 to come out.
 
     Parameters
     ----------
@@ -74,29 +73,18 @@ class PairLearner:
     def learn(self, *, measure: bool = False) -> dict[str, Curve]:
         """Carry out every phase of learning; return figure 12's curves if `measure`."""
         layout = self.layout
-        trigger, goal = layout.triggers[self.trigger], layout.goals[self.goal]
-        starts_a = self._states(self.first - {trigger}, "closed")
-        phases: list[tuple[str, str, list[int], Cell, str]] = [
-            (f"GotoTrigger({self.trigger})", "", starts_a, layout.start, "closed")
-        ]
-        doors = layout.thresholds
-        phases += [(f"GotoDoor({d})", "", self._states(self.first, "open"), trigger, "open") for d in doors]
-        to_goal = f"GotoGoal({self.goal})"
-        phases += [
-            (to_goal, f" from {d}", [self.state(cell, "open")], cell, "open") for d, cell in doors.items()
-        ]
-        curves = {}
-        for task, suffix, starts, start, state in phases:
-            place, at = self.grounded.place(task), self.state(start, state)
-            greedy: list[int | None] = []
-            after_each = self._measure(place, at, greedy) if measure else None
-            training = self.learner.train(place, starts, EPISODES, after_each)
-            if measure:
-                optimum = int(task_field(self.grounded.model, self.grounded.nodes[place]).distance[at])
-                curves[task + suffix] = Curve(start, optimum, tuple(training), tuple(greedy))
-        self.learner.train(self.grounded.place(to_goal), self._states(self.second - {goal}, "open"), EPISODES)
-        self.learner.train(self.grounded.root, starts_a, EPISODES)
-        return curves
+        trigger, doors = layout.triggers[self.trigger], layout.thresholds
+        begin = layout.start if layout.start != trigger else min(self.first - {trigger})
+        to_trigger, *to_doors, to_goal = self.subtasks()
+        phases = [(to_trigger, "", begin), *((to_door, "", trigger) for to_door in to_doors)]
+        phases += [(to_goal, f" from {name}", cell) for name, cell in doors.items()]
+        curves = {
+            task + suffix: self._learn_from(task, start, measure=measure) for task, suffix, start in phases
+        }
+        for task in self.subtasks():
+            self.learner.train(self.grounded.place(task), self._starts(task), EPISODES)
+        self.learner.train(self.grounded.root, self._starts(to_trigger), EPISODES)
+        return curves if measure else {}
 
     def step_table(self, task: str) -> Table:
         """Return the greedy policy's steps from every grid of a subtask's room (figure 13)."""
@@ -123,30 +111,42 @@ class PairLearner:
         """Count grids from which a subtask's greedy policy takes other than the oracle's steps."""
         wrong = 0
         for task in self.subtasks():
-            place, doors = self.grounded.place(task), self._doors(task)
+            place = self.grounded.place(task)
             distance = task_field(self.grounded.model, self.grounded.nodes[place]).distance
-            for cell in self.room(task):
-                at = self.state(cell, doors)
-                if distance[at] != UNREACHED:
-                    wrong += self.learner.greedy_steps(place, at) != int(distance[at])
+            for at in self._starts(task):
+                wrong += self.learner.greedy_steps(place, at) != int(distance[at])
         return wrong
 
     def wrong_starts(self) -> int:
         """Count starts from which the whole task takes other than the fewest steps possible."""
         root = self.grounded.root
         best = flat_field(self.grounded.model, self.grounded.nodes[root].terminal).distance
-        starts = self._states(self.first - {self.layout.triggers[self.trigger]}, "closed")
+        starts = self._starts(f"GotoTrigger({self.trigger})")
         return sum(self.learner.greedy_steps(root, at) != int(best[at]) for at in starts)
-
-    def _states(self, cells: frozenset[Cell], doors: str) -> list[int]:
-        return [self.state(cell, doors) for cell in sorted(cells)]
 
     def room(self, task: str) -> frozenset[Cell]:
         """Return the room that a subtask works in."""
         return self.second if task.startswith("GotoGoal") else self.first
 
+    def _learn_from(self, task: str, start: Cell, *, measure: bool) -> Curve:
+        """Learn a subtask from one grid; if `measure`, take the greedy policy's steps after each episode."""
+        place, at = self.grounded.place(task), self.state(start, self._doors(task))
+        greedy: list[int | None] = []
+        far = len(self.layout.cells)
+
+        def after_each() -> None:
+            greedy.append(self.learner.greedy_steps(place, at, limit=far))
+
+        training = self.learner.train(place, [at], EPISODES, after_each if measure else None)
+        optimum = int(task_field(self.grounded.model, self.grounded.nodes[place]).distance[at])
+        return Curve(start, optimum, tuple(training), tuple(greedy))
+
+    def _starts(self, task: str) -> list[int]:
+        """Return the states in which a subtask runs and can end, grid by grid of its room."""
+        place, doors = self.grounded.place(task), self._doors(task)
+        distance = task_field(self.grounded.model, self.grounded.nodes[place]).distance
+        states = (self.state(cell, doors) for cell in sorted(self.room(task)))
+        return [at for at in states if distance[at] > 0]
+
     def _doors(self, task: str) -> str:
         return "closed" if task.startswith("GotoTrigger") else "open"
-
-    def _measure(self, place: int, at: int, into: list[int | None]) -> Callable[[], None]:
-        return lambda: into.append(self.learner.greedy_steps(place, at, limit=len(self.layout.cells)))

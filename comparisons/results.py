@@ -133,6 +133,10 @@ def _dynamic(found: Findings) -> dict[str, Any]:
         "episodes": tally.episodes,
         "affordances": len(tally.verdicts),
         "optimal_local_rule": tally.local_optimal,
+        "local_rule_by_situation": {
+            situation: {"affordances": asked, "optimal": optimal}
+            for situation, (asked, optimal) in tally.local_rule_by().items()
+        },
         "optimal_replanning": tally.replanned_optimal,
         "globally_optimal_replanning": found.globally_optimal,
         "without_a_way": tally.boxed_in,

@@ -46,6 +46,8 @@ class Encounter:
         The current subtask's place in the ground graph.
     belief
         What the robot knows, the obstacle included.
+    distance
+        How many cells ahead it is.
     affordance
         What the strategy says.
     """
@@ -55,7 +57,13 @@ class Encounter:
     cell: int
     task: int
     belief: MazeState
+    distance: int
     affordance: Affordance
+
+    @property
+    def known(self) -> int:
+        """How many obstacles the robot knows of."""
+        return len(self.belief.cubes | self.belief.spheres)
 
 
 @dataclass(frozen=True)
@@ -190,7 +198,9 @@ class Robot:
         affordance = self.strategy.affordance(task, cell, belief.state)
         if before and not affordance.on_route:
             return None
-        encounter = Encounter(episode.steps, name, cell, task, belief.state, affordance)
+        here, there = self.layout.cells[belief.state.robot], self.layout.cells[cell]
+        distance = abs(here.row - there.row) + abs(here.col - there.col)
+        encounter = Encounter(episode.steps, name, cell, task, belief.state, distance, affordance)
         run.encounters.append(encounter)
         return encounter
 

@@ -72,7 +72,12 @@ def dynamic(experiment: Experiment, found: Findings) -> Part:
     )
     ends = tuple((outcome.value, tally.outcomes[outcome], alone[outcome]) for outcome in Outcome)
     looks = ((tally.looks, tally.misread, share(tally.misread, tally.looks)),)
+    situations = tuple(
+        (situation, asked, optimal, share(optimal, asked))
+        for situation, (asked, optimal) in tally.local_rule_by().items()
+    )
     tables = (
+        Table("The local rule by situation", ("obstacle", "affordances", "optimal", "share"), situations),
         Table("How the episodes ended", ("end", "replanning", "local rule, told every shape"), ends),
         Table("Looks ahead while replanning", ("looks", "misread", "share"), looks),
     )

@@ -43,7 +43,7 @@ class Exploration:
     (1.0, 0.5, 0.25)
     """
 
-    half: int = 300
+    half: int = 150
 
     def __post_init__(self) -> None:
         if self.half <= 0:
