@@ -49,9 +49,11 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
     UserError
         If `out` exists or cannot be made, or the spec names a layout or backend that there is not.
     """
-    with _new_directory(out) as directory, _progress(console) as progress:
+    _refuse_existing(out)
+    progress = _progress(console)
+    experiment = Experiment(spec, _track(progress))
+    with _new_directory(out) as directory, progress:
         begun = process_time()
-        experiment = Experiment(spec, _track(progress))
         found = find(experiment)
         searched = process_time()
         content = results(spec, experiment.layout, experiment.grounded, found)
@@ -67,11 +69,14 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
     return content
 
 
+def _refuse_existing(out: Path) -> None:
+    if out.exists() or out.is_symlink():
+        raise UserError(f"--out {out}: it exists already; name a new directory, or remove this one")
+
+
 @contextmanager
 def _new_directory(out: Path) -> Iterator[Path]:
     """Yield a directory that takes the name `out` if all goes well, and vanishes if not."""
-    if out.exists() or out.is_symlink():
-        raise UserError(f"--out {out}: it exists already; name a new directory, or remove this one")
     try:
         parent = out.absolute().parent
         parent.mkdir(parents=True, exist_ok=True)
@@ -81,6 +86,7 @@ def _new_directory(out: Path) -> Iterator[Path]:
     try:
         yield made
         made.chmod(0o755)
+        _refuse_existing(out)
         made.rename(out)
     finally:
         shutil.rmtree(made, ignore_errors=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from hierarchy.graph import TaskGraph
+from hierarchy.graph import TaskGraph, TaskGraphError
 from hierarchy.predicates import Param, ValueSet
 from worlds import ACTIONS, Layout, maze_variables
 
@@ -18,6 +18,11 @@ def two_rooms(layout: Layout, *, one_door_task: bool = False) -> TaskGraph:
         False binds GotoDoor to each door, as the paper does, so that the root can choose one. True
         gives the single GotoDoor that ends at either door; what it loses is told by the oracle.
 
+    Raises
+    ------
+    TaskGraphError
+        If the layout has no door.
+
     Examples
     --------
     >>> from worlds import load_layout
@@ -29,6 +34,8 @@ def two_rooms(layout: Layout, *, one_door_task: bool = False) -> TaskGraph:
     GotoDoor(target=D2) when doors = open and robot in room A
     GotoGoal(target=goal) when robot in room B
     """
+    if not layout.thresholds:
+        raise TaskGraphError(f"layout {layout.name} has no door; write ':' between two cells and mark one D1")
     graph = TaskGraph(layout.name, maze_variables(layout), ACTIONS)
     robot, trigger, goal, doors = graph.variables
     first = layout.room(layout.start)

@@ -1,0 +1,125 @@
+"""The command line: what a user's mistake looks like, and that nothing is left behind."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from comparisons.cli import main
+
+MAZE = """\
+name small
+grid
+.  T1 .  |  .  .
+.  .  .  :  D1 G1
+.  .  .  |  .  .
+start 2,0
+trigger T1
+goal G1
+"""
+
+
+def fail(capsys: pytest.CaptureFixture[str], *tokens: str) -> str:
+    """Run a command that must end with status 2 and one message, and return the message."""
+    with pytest.raises(SystemExit) as ended:
+        main(tokens)
+    out, err = capsys.readouterr()
+    assert ended.value.code == 2
+    assert out == ""
+    assert err.startswith("affordant: ")
+    assert "Traceback" not in err
+    return err
+
+
+def spoil(old: str, new: str) -> str:
+    """Return the small maze with one thing wrong."""
+    assert old in MAZE
+    return MAZE.replace(old, new, 1)
+
+
+def test_an_existing_out_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A directory that is there is never written to, empty or not."""
+    message = fail(capsys, "reproduce", "--out", str(tmp_path))
+    assert f"--out {tmp_path}: it exists already" in message
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_out_that_cannot_be_made_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A file in the way of the directory is named as the reason."""
+    (tmp_path / "file").write_text("mine")
+    message = fail(capsys, "reproduce", "--out", str(tmp_path / "file" / "out"))
+    assert "it cannot be made" in message
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize(
+    ("tokens", "expected"),
+    [
+        (("reproduce", "--sed", "3", "--out", "x"), "Did you mean --seed"),
+        (("reproduc", "--out", "x"), 'Did you mean "reproduce"'),
+        (("reproduce", "--seed", "many", "--out", "x"), "many"),
+        (("reproduce",), "--out"),
+        (("reproduce", "--out", "x", "--perception", "hugh"), "did you mean 'hough'?"),
+        (("reproduce", "--out", "x", "--layout", "two_room"), "did you mean 'two_rooms'?"),
+    ],
+)
+def test_unknown_words_get_a_suggestion(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    tokens: tuple[str, ...],
+    expected: str,
+) -> None:
+    """Options, commands, backends and layouts that there are not name what was probably meant."""
+    monkeypatch.chdir(tmp_path)
+    assert expected in fail(capsys, *tokens)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (spoil("T1", "."), "line 2: missing mark: no trigger in the grid"),
+        (spoil(".  .  .  |  .  .\nstart", ".  .  T1 |  .  .\nstart"), "line 5: doubled mark T1"),
+        (spoil(".  .  .  |", ".  .  |"), "line 5: ragged rows"),
+        (spoil(":", "|"), "line 4: D1 is not beside a door"),
+        (spoil("start 2,0", "start 2,4"), "unreachable: T1"),
+        (MAZE + "obstacles\nQ1 cupe 0,0 small #112233 at start\n", "unknown obstacle kind 'cupe'"),
+    ],
+)
+def test_a_wrong_layout_is_named_by_file_and_line(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, text: str, expected: str
+) -> None:
+    """The message names the file, the line and the mend; no output is begun."""
+    path = tmp_path / "mine.maze"
+    path.write_text(text)
+    message = fail(capsys, "reproduce", "--out", str(tmp_path / "out"), "--layout", str(path))
+    assert f"{path}, " in message
+    assert expected in message
+    assert [entry.name for entry in tmp_path.iterdir()] == ["mine.maze"]
+
+
+def test_a_layout_that_the_task_graph_does_not_fit_is_refused(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """A goal in the first room leaves GotoGoal nothing: the message lists the findings."""
+    path = tmp_path / "one_room.maze"
+    path.write_text(spoil(".  T1 .", "G2 T1 ."))
+    message = fail(capsys, "reproduce", "--out", str(tmp_path / "out"), "--layout", str(path))
+    assert "task graph small cannot run" in message
+    assert "GotoGoal(G2)" in message
+    path.write_text("name open\ngrid\n. T1 G1\nstart 0,0\ntrigger T1\ngoal G1\n")
+    message = fail(capsys, "reproduce", "--out", str(tmp_path / "out"), "--layout", str(path))
+    assert "layout open has no door" in message
+
+
+def test_help_is_light() -> None:
+    """Neither --help nor an import of the graph's language loads torch, PyBullet, OpenCV or matplotlib."""
+    heavy = {"torch", "pybullet", "cv2", "matplotlib"}
+    for code in ("import hierarchy", "from comparisons.cli import app; app(['--help'])", "import planners"):
+        program = f"import sys\ntry:\n    {code}\nexcept SystemExit:\n    pass\nprint(*sys.modules)"
+        done = subprocess.run(  # noqa: S603 - our own code
+            [sys.executable, "-c", program], capture_output=True, text=True, check=True
+        )
+        assert not heavy & set(done.stdout.splitlines()[-1].split()), code

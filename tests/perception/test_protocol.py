@@ -1,0 +1,111 @@
+"""Detections, the backend that is told the truth, and backends by name."""
+
+import subprocess
+import sys
+from importlib.metadata import EntryPoint
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from perception import LABELS, NOTHING, Backend, Detection, Truth, View, backend_names, load_backend, registry
+from worlds import UserError
+from worlds.camera import Camera
+
+
+class Pessimist:
+    """A backend that sees cubes everywhere."""
+
+    name = "pessimist"
+    needs_frames = False
+
+    def __init__(self, camera: Camera) -> None:
+        self.camera = camera
+
+    def detect(self, views):
+        """Return a cube for each view."""
+        return [Detection("cube", 1.0, 1) for _ in views]
+
+
+def with_entry_points(monkeypatch, *points):
+    """Let the registry find these entry points beside ours."""
+    monkeypatch.setattr(registry, "entry_points", lambda group: [p for p in points if p.group == group])
+
+
+@given(
+    label=st.sampled_from([*LABELS, "pyramid"]),
+    confidence=st.floats(allow_nan=True),
+    distance=st.integers(-1, 4),
+)
+def test_detection_refuses_contradictions(label, confidence, distance):
+    """A detection exists exactly if label, confidence and distance fit each other."""
+    sound = label in LABELS and 0 <= confidence <= 1 and distance in ((0,) if label == "none" else (1, 2))
+    if sound:
+        assert Detection(label, confidence, distance).distance == distance
+    else:
+        with pytest.raises(ValueError, match=r"label|confidence|distance"):
+            Detection(label, confidence, distance)
+
+
+def test_truth_needs_no_frames_and_never_errs():
+    """Ground truth is returned view by view, without a frame."""
+    truths = [NOTHING, Detection("sphere", 1.0, 2), Detection("cube", 1.0, 1)]
+    backend = Truth()
+    assert not backend.needs_frames
+    assert backend.detect([View(None, truth) for truth in truths]) == truths
+
+
+def test_every_backend_keeps_the_protocol():
+    """Each registered backend is loaded under its own name and has the protocol's members."""
+    assert backend_names()[:2] == ("truth", "hough")
+    for name in backend_names():
+        backend = load_backend(name, Camera(pixels=96))
+        assert isinstance(backend, Backend)
+        assert backend.name == name
+        assert backend.detect([]) == []
+
+
+@pytest.mark.parametrize(("name", "hint"), [("huogh", "did you mean 'hough'?"), ("zebra", "")])
+def test_unknown_backend_is_told_with_the_list(name, hint):
+    """An unknown name is repeated, with the nearest one if there is any, and all that there are."""
+    with pytest.raises(UserError) as caught:
+        load_backend(name)
+    assert name in str(caught.value)
+    assert hint in str(caught.value)
+    assert ("did you mean" in str(caught.value)) == bool(hint)
+    assert "truth, hough" in str(caught.value)
+
+
+def test_entry_point_adds_a_backend(monkeypatch):
+    """Another package's factory is found by its entry point and gets the camera."""
+    with_entry_points(monkeypatch, EntryPoint("pessimist", "plugin:Pessimist", registry.GROUP))
+    monkeypatch.setitem(sys.modules, "plugin", type(sys)("plugin"))
+    sys.modules["plugin"].Pessimist = Pessimist
+    camera = Camera(pixels=32)
+    assert backend_names() == ("truth", "hough", "pessimist")
+    backend = load_backend("pessimist", camera)
+    assert backend.camera is camera
+    assert backend.detect([View(None, NOTHING)])[0].label == "cube"
+
+
+def test_entry_point_cannot_replace_ours(monkeypatch):
+    """A package that calls its backend 'truth' does not get in the place of ours."""
+    with_entry_points(monkeypatch, EntryPoint("truth", "nowhere:Liar", registry.GROUP))
+    assert isinstance(load_backend("truth"), Truth)
+
+
+def test_broken_entry_point_is_a_user_error(monkeypatch):
+    """A backend that cannot be imported is named with its entry point."""
+    with_entry_points(monkeypatch, EntryPoint("broken", "no_such_module_at_all:X", registry.GROUP))
+    with pytest.raises(UserError, match=r"'broken' \(no_such_module_at_all:X\)"):
+        load_backend("broken")
+
+
+def test_import_is_light():
+    """Importing the package, and ground truth, loads neither OpenCV nor PyBullet."""
+    code = (
+        "import sys, perception; perception.load_backend('truth'); "
+        "print(sorted({'cv2', 'pybullet', 'torch', 'matplotlib'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)  # noqa: S603
+    assert done.stdout.strip() == "[]"
