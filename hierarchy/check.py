@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
-from hierarchy.grounding import GroundGraph, GroundTask, ground
+from hierarchy.grounding import GroundCall, GroundGraph, GroundTask, ground
 from hierarchy.predicates import Param, Predicate, Term, Var
 from worlds import TransitionModel
 
@@ -190,7 +190,34 @@ def _behaviour(grounded: GroundGraph) -> Iterator[Finding]:
                     "the child can never run: guard, working space and termination leave no state",
                     "relax the guard (when), or remove the edge",
                 )
+            yield from _straying(grounded, task, call, call.available & reachable)
         yield from _ending(grounded, task, called[place] & task.live, reachable)
+
+
+def _straying(
+    grounded: GroundGraph, task: GroundTask, call: GroundCall, called: NDArray[np.bool_]
+) -> Iterator[Finding]:
+    """Check that a child task does not end where its caller neither runs nor ends."""
+    child = grounded.nodes[call.child]
+    if not child.calls:
+        return
+    passed = called.copy()
+    moves = list(_moves(grounded, child))
+    while True:
+        more = passed.copy()
+        for action, available in moves:
+            more[grounded.model.successors[passed & available & ~child.terminal, action]] = True
+        if (more == passed).all():
+            break
+        passed = more
+    strays = passed & child.terminal & ~task.live & ~task.terminal
+    if strays.any():
+        yield Finding(
+            "strays",
+            f"{task.name} -> {child.name}",
+            f"the child can end outside its caller's working space, such as {_describe(grounded, strays)}",
+            f"widen the working space (within) of {task.name}, or narrow that of {child.name}",
+        )
 
 
 def _ending(

@@ -60,5 +60,8 @@ def task_graph_picture(graph: TaskGraph) -> nx.DiGraph[str]:
             if child not in picture:
                 picture.add_node(child, label=child, kind="task")
                 stack.append((child, call.child))
-            picture.add_edge(node, child, label="" if call.guard == ALWAYS else f"when {call.guard}")
+            label = "" if call.guard == ALWAYS else f"when {call.guard}"
+            if picture.has_edge(node, child):  # the same call under another guard
+                label = f"{picture.edges[node, child]['label']} or {label}"
+            picture.add_edge(node, child, label=label)
     return picture

@@ -101,15 +101,17 @@ class LocalRule:
         return route
 
     def _best(self, task: int, belief: MazeState, refused: int | None) -> int | None:
-        """Return the best action by the learnt values, past one refused and those a known cube stops."""
+        """Return the best action by the learnt values, past one refused and those that would not move.
+
+        Running into a wall or a known cube is an action as well, and its value is one step below the
+        best; but it is no way of avoiding anything.
+        """
         learner, state = self.learner, self._state(belief)
         calls = learner.grounded.nodes[task].calls
-        open_to = [
-            k
-            for k in learner.choices(task, state)
-            if calls[k].child != refused
-            and self.layout.neighbours[belief.robot][calls[k].child] not in belief.cubes
-        ]
+        ways = (self.layout.passage(belief.robot, call.child, doors_open=belief.doors_open) for call in calls)
+        blocked = [to < 0 or to in belief.cubes for to in ways]
+        choices = learner.choices(task, state)
+        open_to = [k for k in choices if calls[k].child != refused and not blocked[k]]
         if not open_to:
             return None
         values = [learner.q(task, state, k) for k in open_to]

@@ -132,12 +132,12 @@ class MaxQ:
         counts = []
         for _ in range(episodes):
             self._limit = self.steps + self.settings.max_steps
-            counts.append(self.run(task, self._random.choose(starts))[0])
+            counts.append(self._run(task, self._random.choose(starts))[0])
             if after_each is not None:
                 after_each()
         return counts
 
-    def run(self, task: int, state: int, caller_rate: float = 1.0) -> tuple[int, int]:
+    def _run(self, task: int, state: int, caller_rate: float = 1.0) -> tuple[int, int]:
         """Carry out a task once, learning; return its primitive steps N and the state it ends in (table 2).
 
         A primitive action has no episodes of its own, and learns its reward at its caller's rate.
@@ -153,7 +153,7 @@ class MaxQ:
         count = 0
         while not self._terminal[task][state]:
             k = self._explore(task, state, explore)
-            steps, after = self.run(self._children[task][k], state, rate)
+            steps, after = self._run(self._children[task][k], state, rate)
             target = self.settings.gamma**steps * self.value(task, after)
             table, row = self.completion[task][k], self._row[task][k][state]
             table[row] += rate * (target - table[row])

@@ -11,10 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from hierarchy import GroundGraph, GroundTask
-from worlds import ACTIONS, Layout, MazeState, step
+from worlds import ACTIONS, Cell, Layout, MazeState, state_number, step
 
 SearchState = tuple[int, bool, frozenset[int]]
 """Robot's cell, doors open, spheres' cells."""
@@ -22,16 +20,20 @@ SearchState = tuple[int, bool, frozenset[int]]
 
 @dataclass(frozen=True, eq=False)
 class Area:
-    """Where a task runs and ends in one episode: cells by doors shut (0) and open (1).
+    """What a task may do and where it ends in one episode: by doors shut (0) and open (1), and by cell.
 
     Parameters
     ----------
-    live, terminal
-        Whether the task runs, or has ended, at ``[doors_open][cell]``.
+    actions
+        The primitive actions that the task may take at ``[doors_open][cell]``, in the order of
+        `worlds.ACTIONS`; none where it does not run. A task that calls tasks may take every action: its
+        plan is the flat optimum of ending it.
+    terminal
+        Whether the task has ended at ``[doors_open][cell]``.
     """
 
-    live: tuple[tuple[bool, ...], tuple[bool, ...]]
-    terminal: tuple[tuple[bool, ...], tuple[bool, ...]]
+    actions: tuple[tuple[tuple[int, ...], ...], ...]
+    terminal: tuple[tuple[bool, ...], ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +92,8 @@ class Replanner:
     def plan(self, task: int, belief: MazeState) -> Plan | None:
         """Return a shortest plan of primitive actions that ends `task`, or None if there is no way.
 
-        The primitive actions are those of the task's working space: none leaves it but to end the task.
+        A task whose children are primitive actions takes only those, where their guards and its working
+        space allow; a task that calls tasks takes any (see `Area`).
         """
         area = self.area(task, belief)
         start = _search_state(belief)
@@ -152,9 +155,9 @@ def _plan_faults(layout: Layout, area: Area, belief: MazeState, plan: Plan) -> I
     for action in plan.actions:
         if area.terminal[state.doors_open][state.robot]:
             yield "the plan ends the task before its last action"
+        elif action not in area.actions[state.doors_open][state.robot]:
+            yield f"the task may not take {ACTIONS[action]} from {layout.cells[state.robot]}"
         state, _ = step(layout, state, action)
-        if not (area.live[state.doors_open][state.robot] or area.terminal[state.doors_open][state.robot]):
-            yield "the plan leaves the task's working space"
     if not area.terminal[state.doors_open][state.robot]:
         yield "the plan does not end the task"
 
@@ -177,30 +180,40 @@ def _moves(
 ) -> list[tuple[int, SearchState]]:
     """Return the moves out of a search state that the task may make, in order."""
     robot, doors_open, spheres = state
-    if not area.live[doors_open][robot]:
-        return []
     here = replace(belief, robot=robot, doors_open=doors_open, spheres=spheres)
     moves = []
-    for action in range(len(ACTIONS)):
+    for action in area.actions[doors_open][robot]:
         after, _ = step(layout, here, action)
-        if after is here:
-            continue
-        if area.live[after.doors_open][after.robot] or area.terminal[after.doors_open][after.robot]:
+        if after is not here:
             moves.append((action, _search_state(after)))
     return moves
 
 
 def _area(layout: Layout, grounded: GroundGraph, task: GroundTask, belief: MazeState) -> Area:
-    index = grounded.model.index
-    live = np.zeros((2, len(layout.cells)), dtype=np.bool_)
-    terminal = live.copy()
-    for number, cell in enumerate(layout.cells):
-        if cell in layout.solid:
-            continue
-        for doors, word in enumerate(("closed", "open")):
-            at = index.number((cell, layout.cells[belief.trigger], layout.cells[belief.goal], word))
-            live[doors, number], terminal[doors, number] = task.live[at], task.terminal[at]
-    return Area(
-        live=(tuple(live[0].tolist()), tuple(live[1].tolist())),
-        terminal=(tuple(terminal[0].tolist()), tuple(terminal[1].tolist())),
-    )
+    actions: list[list[tuple[int, ...]]] = []
+    terminal: list[list[bool]] = []
+    for doors_open in (False, True):
+        states = [_state_at(layout, grounded, belief, cell, doors_open) for cell in layout.cells]
+        actions.append([() if at is None else _actions(grounded, task, at) for at in states])
+        terminal.append([at is not None and bool(task.terminal[at]) for at in states])
+    return Area(tuple(map(tuple, actions)), tuple(map(tuple, terminal)))
+
+
+def _state_at(
+    layout: Layout, grounded: GroundGraph, belief: MazeState, cell: Cell, doors_open: bool
+) -> int | None:
+    """Return the number of the state with the robot in a cell, or None if the cell is solid."""
+    if cell in layout.solid:
+        return None
+    here = replace(belief, robot=layout.number(cell), doors_open=doors_open)
+    return state_number(layout, grounded.model.index, here)
+
+
+def _actions(grounded: GroundGraph, task: GroundTask, state: int) -> tuple[int, ...]:
+    """Return the primitive actions that a task may take in a state."""
+    everything = len(grounded.model.actions)
+    if not task.live[state]:
+        return ()
+    if any(call.child >= everything for call in task.calls):
+        return tuple(range(everything))
+    return tuple(sorted({call.child for call in task.calls if call.available[state]}))
