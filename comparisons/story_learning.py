@@ -123,7 +123,7 @@ def learning(experiment: Experiment, found: Findings) -> Part:
 
 
 def _convergence(curves: Mapping[str, Curve]) -> Figure:
-    drawn = {
+    drawn: dict[str, dict[str, Sequence[float]]] = {
         name: {
             "training": list(curve.training),
             "median": _running_median(curve.training),

@@ -42,7 +42,9 @@ def static(_experiment: Experiment, found: Findings) -> Part:
         f"8) held in {pushes.rotation} of them. Had displacement alone decided, it would have seemed to "
         f"hold in {pushes.displacement}."
     )
-    figure = push_figure({kind: dict(labels) for kind, labels in pushes.counts.items()})
+    figure = push_figure(
+        {kind: {str(label): n for label, n in labels.items()} for kind, labels in pushes.counts.items()}
+    )
     section = Section(
         "Static affordances: what rolls", (text,), figures=(("pushes", "What pushed obstacles did."),)
     )

@@ -93,11 +93,11 @@ def score(views: Sequence[View], predicted: Sequence[Detection]) -> Accuracy:
         if right and seen.label != "none":
             found += 1
             far += view.truth.distance == seen.distance
-    rows = {true: dict(zip(LABELS, row, strict=True)) for true, row in zip(LABELS, matrix.tolist(), strict=True)}
+    rows = zip(LABELS, matrix.tolist(), strict=True)
     return Accuracy(
         frames=len(views),
-        confusion={true: dict(row) for true, row in rows.items()},
-        accuracy=float(np.trace(matrix)) / len(views),
+        confusion={true: dict(zip(LABELS, row, strict=True)) for true, row in rows},
+        accuracy=int(np.trace(matrix)) / len(views),
         distance_accuracy=far / found if found else 1.0,
         groups=dict(sorted(groups.items())),
     )

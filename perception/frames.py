@@ -6,9 +6,8 @@ are the hundred.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Final
 
 from perception.protocol import LABELS, NOTHING, REACH, Detection, Label, View
@@ -18,6 +17,10 @@ from worlds.twin import Twin
 
 MOST_OTHERS: Final = 2
 """At most so many obstacles stand elsewhere in the maze."""
+
+Way = tuple[Cell, int, tuple[Cell, ...]]
+"""A cell, an action, and the free cells ahead up to the first wall or shut door."""
+Ways = Mapping[bool, tuple[Way, ...]]
 
 
 @dataclass(frozen=True)
@@ -46,7 +49,7 @@ class FreshScene:
 def fresh_scene(layout: Layout, seed: int, number: int) -> FreshScene:
     """Draw one scene.
 
-    Drawn, each evenly: the label, such that every three scenes in a row hold one of each; doors open or
+    Drawn, each evenly: the label, such that scenes 0 to 2, 3 to 5, ... hold one of each; doors open or
     shut; for an obstacle its distance (1 or 2 cells), size (of three) and colour; then the robot's cell
     and heading among those with no wall or shut door before that distance (for "none" among all, so
     that walls and doors close by and long corridors are views as well); and 0, 1 or 2 more obstacles
@@ -72,25 +75,7 @@ def fresh_scene(layout: Layout, seed: int, number: int) -> FreshScene:
     >>> sorted(fresh_scene(maze, seed=1, number=i).truth.label for i in range(3))
     ['cube', 'none', 'sphere']
     """
-    stream = Stream(seed, 0, number)
-    label: Label = Stream(seed, 1, number // len(LABELS)).shuffled(LABELS)[number % len(LABELS)]
-    doors_open = stream.below(2) == 1
-    free_cells = _ways(layout, doors_open=doors_open)
-    if label == "none":
-        robot, action, way = stream.choose(free_cells)
-        truth, obstacles = NOTHING, []
-    else:
-        longest = min(REACH, max(len(way) for *_, way in free_cells))
-        if longest == 0:
-            raise UserError(f"layout {layout.name}: an obstacle needs two free cells in a row; open a wall")
-        distance = 1 + stream.below(longest)
-        robot, action, way = stream.choose([item for item in free_cells if len(item[2]) >= distance])
-        truth = Detection(label, 1.0, distance)
-        obstacles = [_obstacle(stream, "ahead", way[distance - 1], label)]
-    elsewhere = sorted({cell for cell, _, _ in free_cells} - {robot, *way})
-    for i, cell in enumerate(stream.shuffled(elsewhere)[: stream.below(MOST_OTHERS + 1)]):
-        obstacles.append(_obstacle(stream, f"other{i + 1}", cell, stream.choose(KINDS)))
-    return FreshScene(robot, action, doors_open, truth, tuple(obstacles))
+    return _draw(layout, _ways(layout), seed, number)
 
 
 def fresh_views(layout: Layout, n: int, seed: int, camera: Camera | None = None) -> Iterator[View]:
@@ -119,12 +104,35 @@ def fresh_views(layout: Layout, n: int, seed: int, camera: Camera | None = None)
     ...     view.frame.shape
     (64, 64, 3)
     """
+    ways = _ways(layout)
     with Twin(layout, camera) as twin:
         for number in range(n):
-            scene = fresh_scene(layout, seed, number)
+            scene = _draw(layout, ways, seed, number)
             twin.stage(scene.robot, scene.action, scene.obstacles, doors_open=scene.doors_open)
             size = None if scene.truth.label == "none" else scene.obstacles[0].size
             yield View(twin.frame(), scene.truth, size)
+
+
+def _draw(layout: Layout, ways: Ways, seed: int, number: int) -> FreshScene:
+    stream = Stream(seed, 0, number)
+    label: Label = Stream(seed, 1, number // len(LABELS)).shuffled(LABELS)[number % len(LABELS)]
+    doors_open = stream.below(2) == 1
+    here = ways[doors_open]
+    if label == "none":
+        robot, action, way = stream.choose(here)
+        truth, obstacles = NOTHING, []
+    else:
+        longest = min(REACH, max(len(way) for *_, way in here))
+        if longest == 0:
+            raise UserError(f"layout {layout.name}: an obstacle needs two free cells in a row; open a wall")
+        distance = 1 + stream.below(longest)
+        robot, action, way = stream.choose([item for item in here if len(item[2]) >= distance])
+        truth = Detection(label, 1.0, distance)
+        obstacles = [_obstacle(stream, "ahead", way[distance - 1], label)]
+    elsewhere = sorted({cell for cell, _, _ in here} - {robot, *way})
+    for i, cell in enumerate(stream.shuffled(elsewhere)[: stream.below(MOST_OTHERS + 1)]):
+        obstacles.append(_obstacle(stream, f"other{i + 1}", cell, stream.choose(KINDS)))
+    return FreshScene(robot, action, doors_open, truth, tuple(obstacles))
 
 
 def _obstacle(stream: Stream, name: str, cell: Cell, kind: Label) -> Obstacle:
@@ -132,18 +140,17 @@ def _obstacle(stream: Stream, name: str, cell: Cell, kind: Label) -> Obstacle:
     return Obstacle(name, kind, cell, stream.choose(SIZES), f"#{stream.below(1 << 24):06x}")
 
 
-Way = tuple[Cell, int, tuple[Cell, ...]]
-"""A cell, an action, and the free cells ahead up to the first wall or shut door."""
-
-
-def _ways(layout: Layout, *, doors_open: bool) -> tuple[Way, ...]:
-    """Return the way ahead of every free cell along every action."""
-    return tuple(
-        (cell, action, _way(layout, layout.number(cell), action, doors_open=doors_open))
-        for cell in layout.cells
-        if cell not in layout.solid
-        for action in range(len(ACTIONS))
-    )
+def _ways(layout: Layout) -> Ways:
+    """Return the way ahead of every free cell along every action, doors shut and doors open."""
+    return {
+        doors_open: tuple(
+            (cell, action, _way(layout, layout.number(cell), action, doors_open=doors_open))
+            for cell in layout.cells
+            if cell not in layout.solid
+            for action in range(len(ACTIONS))
+        )
+        for doors_open in (False, True)
+    }
 
 
 def _way(layout: Layout, cell: int, action: int, *, doors_open: bool) -> tuple[Cell, ...]:

@@ -15,6 +15,7 @@ from importlib.metadata import EntryPoint, entry_points
 from typing import Final
 
 from perception.protocol import Backend
+from perception.truth import Truth
 from worlds import UserError
 from worlds.camera import Camera
 
@@ -92,6 +93,4 @@ def _load(point: EntryPoint) -> Factory:
 
 
 def _truth(_camera: Camera) -> Backend:
-    from perception.truth import Truth  # noqa: PLC0415
-
     return Truth()

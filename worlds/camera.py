@@ -51,7 +51,7 @@ class Camera:
     (64, 76)
     """
 
-    pixels: int = 128
+    pixels: int = 96
     fov: float = 44.0
     height: float = 1.2
     forward: float = -0.4

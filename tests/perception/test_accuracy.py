@@ -1,17 +1,20 @@
 """Confusion matrix and shares, against counts made by hand."""
 
+from collections.abc import Iterable, Sequence
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from perception import LABELS, NOTHING, Detection, Truth, View, confusion, measure
 from perception.accuracy import score
+from worlds import Size
 
 CUBE1, CUBE2 = Detection("cube", 1.0, 1), Detection("cube", 0.8, 2)
 BALL1, BALL2 = Detection("sphere", 1.0, 1), Detection("sphere", 0.6, 2)
 TRUTH = [NOTHING, NOTHING, CUBE1, CUBE1, CUBE2, BALL1, BALL2, BALL2]
 SEEN = [NOTHING, BALL1, CUBE1, CUBE2, NOTHING, BALL1, BALL2, CUBE2]
-SIZES = [None, None, "small", "small", "large", "middle", "large", "large"]
+SIZES: list[Size | None] = [None, None, "small", "small", "large", "middle", "large", "large"]
 
 
 class Recorded:
@@ -20,23 +23,23 @@ class Recorded:
     name = "recorded"
     needs_frames = False
 
-    def __init__(self, detections):
+    def __init__(self, detections: Iterable[Detection]) -> None:
         self.left = list(detections)
-        self.batches = []
+        self.batches: list[int] = []
 
-    def detect(self, views):
+    def detect(self, views: Sequence[View]) -> list[Detection]:
         """Return the next detections."""
         self.batches.append(len(views))
         out, self.left = self.left[: len(views)], self.left[len(views) :]
         return out
 
 
-def test_confusion_by_hand():
+def test_confusion_by_hand() -> None:
     """Rows are the truth, columns what was seen."""
     assert confusion(TRUTH, SEEN).tolist() == [[1, 0, 1], [1, 2, 0], [0, 1, 2]]
 
 
-def test_score_by_hand():
+def test_score_by_hand() -> None:
     """Five of eight labels are right, and three of the four distances that go with them."""
     result = score([View(None, t, s) for t, s in zip(TRUTH, SIZES, strict=True)], SEEN)
     assert result.frames == 8
@@ -52,7 +55,7 @@ def test_score_by_hand():
     }
 
 
-def test_measure_streams_and_keeps_order():
+def test_measure_streams_and_keeps_order() -> None:
     """A long stream is looked at in batches and scored as if at once."""
     backend = Recorded(SEEN * 30)
     result = measure(backend, (View(None, truth) for truth in TRUTH * 30))
@@ -61,13 +64,13 @@ def test_measure_streams_and_keeps_order():
     assert result.accuracy == 5 / 8
 
 
-def test_no_views_are_refused():
+def test_no_views_are_refused() -> None:
     """There is no accuracy of nothing."""
     with pytest.raises(ValueError, match="no views"):
         measure(Truth(), [])
 
 
-def test_lengths_must_agree():
+def test_lengths_must_agree() -> None:
     """A backend that drops a view is caught."""
     with pytest.raises(ValueError, match="shorter"):
         confusion(TRUTH, SEEN[:-1])
@@ -81,7 +84,7 @@ detections = st.builds(
 
 
 @given(st.lists(st.tuples(detections, detections), min_size=1))
-def test_counts_add_up(pairs):
+def test_counts_add_up(pairs: list[tuple[Detection, Detection]]) -> None:
     """Confusion and groups count every view once, and accuracy is the diagonal's share."""
     result = score([View(None, truth) for truth, _ in pairs], [seen for _, seen in pairs])
     assert sum(sum(row.values()) for row in result.confusion.values()) == len(pairs)

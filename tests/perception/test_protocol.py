@@ -2,13 +2,26 @@
 
 import subprocess
 import sys
+from collections.abc import Sequence
 from importlib.metadata import EntryPoint
+from types import ModuleType
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from perception import LABELS, NOTHING, Backend, Detection, Truth, View, backend_names, load_backend, registry
+from perception import (
+    LABELS,
+    NOTHING,
+    Backend,
+    Detection,
+    Label,
+    Truth,
+    View,
+    backend_names,
+    load_backend,
+    registry,
+)
 from worlds import UserError
 from worlds.camera import Camera
 
@@ -22,12 +35,12 @@ class Pessimist:
     def __init__(self, camera: Camera) -> None:
         self.camera = camera
 
-    def detect(self, views):
+    def detect(self, views: Sequence[View]) -> list[Detection]:
         """Return a cube for each view."""
         return [Detection("cube", 1.0, 1) for _ in views]
 
 
-def with_entry_points(monkeypatch, *points):
+def with_entry_points(monkeypatch: pytest.MonkeyPatch, *points: EntryPoint) -> None:
     """Let the registry find these entry points beside ours."""
     monkeypatch.setattr(registry, "entry_points", lambda group: [p for p in points if p.group == group])
 
@@ -37,7 +50,7 @@ def with_entry_points(monkeypatch, *points):
     confidence=st.floats(allow_nan=True),
     distance=st.integers(-1, 4),
 )
-def test_detection_refuses_contradictions(label, confidence, distance):
+def test_detection_refuses_contradictions(label: Label, confidence: float, distance: int) -> None:
     """A detection exists exactly if label, confidence and distance fit each other."""
     sound = label in LABELS and 0 <= confidence <= 1 and distance in ((0,) if label == "none" else (1, 2))
     if sound:
@@ -47,7 +60,7 @@ def test_detection_refuses_contradictions(label, confidence, distance):
             Detection(label, confidence, distance)
 
 
-def test_truth_needs_no_frames_and_never_errs():
+def test_truth_needs_no_frames_and_never_errs() -> None:
     """Ground truth is returned view by view, without a frame."""
     truths = [NOTHING, Detection("sphere", 1.0, 2), Detection("cube", 1.0, 1)]
     backend = Truth()
@@ -55,7 +68,7 @@ def test_truth_needs_no_frames_and_never_errs():
     assert backend.detect([View(None, truth) for truth in truths]) == truths
 
 
-def test_every_backend_keeps_the_protocol():
+def test_every_backend_keeps_the_protocol() -> None:
     """Each registered backend is loaded under its own name and has the protocol's members."""
     assert backend_names()[:2] == ("truth", "hough")
     for name in backend_names():
@@ -66,7 +79,7 @@ def test_every_backend_keeps_the_protocol():
 
 
 @pytest.mark.parametrize(("name", "hint"), [("huogh", "did you mean 'hough'?"), ("zebra", "")])
-def test_unknown_backend_is_told_with_the_list(name, hint):
+def test_unknown_backend_is_told_with_the_list(name: str, hint: str) -> None:
     """An unknown name is repeated, with the nearest one if there is any, and all that there are."""
     with pytest.raises(UserError) as caught:
         load_backend(name)
@@ -76,11 +89,12 @@ def test_unknown_backend_is_told_with_the_list(name, hint):
     assert "truth, hough" in str(caught.value)
 
 
-def test_entry_point_adds_a_backend(monkeypatch):
+def test_entry_point_adds_a_backend(monkeypatch: pytest.MonkeyPatch) -> None:
     """Another package's factory is found by its entry point and gets the camera."""
     with_entry_points(monkeypatch, EntryPoint("pessimist", "plugin:Pessimist", registry.GROUP))
-    monkeypatch.setitem(sys.modules, "plugin", type(sys)("plugin"))
-    sys.modules["plugin"].Pessimist = Pessimist
+    plugin = ModuleType("plugin")
+    vars(plugin)["Pessimist"] = Pessimist
+    monkeypatch.setitem(sys.modules, "plugin", plugin)
     camera = Camera(pixels=32)
     assert backend_names() == ("truth", "hough", "pessimist")
     backend = load_backend("pessimist", camera)
@@ -88,20 +102,20 @@ def test_entry_point_adds_a_backend(monkeypatch):
     assert backend.detect([View(None, NOTHING)])[0].label == "cube"
 
 
-def test_entry_point_cannot_replace_ours(monkeypatch):
+def test_entry_point_cannot_replace_ours(monkeypatch: pytest.MonkeyPatch) -> None:
     """A package that calls its backend 'truth' does not get in the place of ours."""
     with_entry_points(monkeypatch, EntryPoint("truth", "nowhere:Liar", registry.GROUP))
     assert isinstance(load_backend("truth"), Truth)
 
 
-def test_broken_entry_point_is_a_user_error(monkeypatch):
+def test_broken_entry_point_is_a_user_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """A backend that cannot be imported is named with its entry point."""
     with_entry_points(monkeypatch, EntryPoint("broken", "no_such_module_at_all:X", registry.GROUP))
     with pytest.raises(UserError, match=r"'broken' \(no_such_module_at_all:X\)"):
         load_backend("broken")
 
 
-def test_import_is_light():
+def test_import_is_light() -> None:
     """Importing the package, and ground truth, loads neither OpenCV nor PyBullet."""
     code = (
         "import sys, perception; perception.load_backend('truth'); "
