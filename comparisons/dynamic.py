@@ -85,7 +85,10 @@ class Tally:
     verdicts
         The affordances of obstacles on the route that have a way left.
     boxed_in
-        Those that have none: the subtask is given up, and the root chooses anew.
+        Those that leave none: the subtask is given up, and the root chooses anew.
+    hopeless
+        Ends with no route left in which the whole maze has no way either, by a search that knows what
+        the robot knows and is bound to no subtask.
     steps
         Primitive steps in all.
     looks, misread
@@ -96,12 +99,15 @@ class Tally:
     outcomes: Counter[Outcome] = field(default_factory=Counter)
     verdicts: list[Verdict] = field(default_factory=list)
     boxed_in: int = 0
+    hopeless: int = 0
     steps: int = 0
     looks: int = 0
     misread: int = 0
 
-    def add(self, run: Run, verdicts: Iterable[Verdict | None]) -> None:
+    def add(self, run: Run, verdicts: Iterable[Verdict | None], oracle: Replanner) -> None:
         """Count one episode."""
+        if run.outcome is Outcome.NO_ROUTE:
+            self.hopeless += oracle.plan(oracle.grounded.root, run.belief) is None
         self.episodes += 1
         self.outcomes[run.outcome] += 1
         self.steps += run.steps
@@ -139,9 +145,13 @@ class Tally:
         return {situation: (asked[situation], optimal[situation]) for situation in sorted(asked)}
 
     def counterexample(self) -> Verdict | None:
-        """Return a verdict that refutes the local rule: a near obstacle, and few that are known."""
+        """Return a verdict that refutes the local rule, by a near cube and few obstacles if it can."""
         refuted = [v for v in self.verdicts if v.local is not None and not v.local.optimal]
-        return min(refuted, key=lambda v: (v.encounter.distance, v.encounter.known), default=None)
+        return min(refuted, key=lambda v: _telling(v.encounter), default=None)
+
+
+def _telling(met: Encounter) -> tuple[bool, int, int]:
+    return met.affordance.shape != "cube", met.distance, met.known
 
 
 def _situation(verdict: Verdict) -> str:

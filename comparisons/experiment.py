@@ -225,9 +225,8 @@ class Experiment:
             robot = Robot(self.layout, self.grounded, Replanning(self.oracle, learner), sight)
             run = robot.run(episode)
             local = LocalRule(self.layout, learner)
-            tally.add(
-                run, [judge(self.oracle, local, met) for met in run.encounters if met.affordance.on_route]
-            )
+            met = [encounter for encounter in run.encounters if encounter.affordance.on_route]
+            tally.add(run, [judge(self.oracle, local, encounter) for encounter in met], self.oracle)
         return tally
 
     def _example_episode(self, *, obstacles: bool) -> Episode:

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from typing import Any, Final
+from importlib.metadata import requires, version
+from platform import python_version
+from typing import Any
+
+from packaging.requirements import Requirement
 
 from comparisons.dynamic import Tally
 from comparisons.experiment import Example, Experiment, Learnt, Spec
@@ -15,8 +18,6 @@ from perception.accuracy import Accuracy
 from perception.pushing import Agreement
 from planners import Gap
 from worlds import ACTIONS, Layout, Outcome
-
-_PACKAGES: Final = ("affordant", "gymnasium", "networkx", "numpy", "opencv-python-headless", "pybullet")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +61,7 @@ def results(spec: Spec, layout: Layout, grounded: GroundGraph, found: Findings) 
         "seed": spec.seed,
         "quick": spec.quick,
         "layout": spec.layout,
-        "versions": {name: version(name) for name in _PACKAGES},
+        "versions": _versions(),
         "value_counts": _value_counts(found.counts),
         "static": {
             "pushes": found.pushes.trials,
@@ -113,6 +114,13 @@ def affordances(layout: Layout, grounded: GroundGraph, run: Run) -> list[dict[st
     return rows
 
 
+def _versions() -> dict[str, str]:
+    """Return the versions of Python, of affordant, and of everything that it requires."""
+    wanted = [Requirement(text) for text in requires("affordant") or ()]
+    names = sorted({need.name for need in wanted if need.marker is None})
+    return {"python": python_version(), **{name: version(name) for name in ("affordant", *names)}}
+
+
 def _value_counts(counts: ValueCounts) -> dict[str, int]:
     return {
         "flat_q": counts.flat,
@@ -142,6 +150,7 @@ def _dynamic(found: Findings) -> dict[str, Any]:
         "without_a_way": tally.boxed_in,
         "outcomes": {outcome.value: tally.outcomes[outcome] for outcome in Outcome},
         "outcomes_local_rule_alone": {outcome.value: n for outcome, n in found.local_rule.items()},
+        "no_route_in_the_whole_maze": tally.hopeless,
         "steps": tally.steps,
         "looks": tally.looks,
         "misread": tally.misread,

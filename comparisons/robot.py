@@ -95,8 +95,11 @@ class Run:
         The spheres' rolls.
     looks, misread
         Looks ahead, and those that told a wrong shape or distance.
+    belief
+        What the robot knew in the end.
     """
 
+    belief: MazeState
     outcome: Outcome = Outcome.TRUNCATED
     cells: list[Cell] = field(default_factory=list)
     tasks: list[int] = field(default_factory=list)
@@ -133,14 +136,13 @@ class Robot:
     def run(self, episode: Episode, watch: Callable[[Moment], None] | None = None) -> Run:
         """Carry an episode to its end; `watch` is called before every step."""
         belief = Belief(self.layout, episode)
-        run = Run(cells=[self.layout.cells[episode.state.robot]])
+        run = Run(belief.state, cells=[self.layout.cells[episode.state.robot]])
         self.eye.begin(episode)
         task: int | None = None
         while not episode.reached and episode.steps < MAX_STEPS:
             decided = self._decide(episode, belief, task, run)
             if decided is None:
-                run.outcome = self._blame(belief, episode, Outcome.NO_ROUTE)
-                return run
+                break
             task = decided.task
             if watch is not None:
                 watch(decided)
@@ -151,7 +153,12 @@ class Robot:
             run.tasks.append(task)
             if change.push is not None:
                 run.pushes.append(change.push)
-        run.outcome = Outcome.REACHED if episode.reached else self._blame(belief, episode, Outcome.TRUNCATED)
+        run.belief = belief.state
+        if episode.reached:
+            run.outcome = Outcome.REACHED
+        else:
+            failure = Outcome.TRUNCATED if episode.steps >= MAX_STEPS else Outcome.NO_ROUTE
+            run.outcome = self._blame(belief, episode, failure)
         return run
 
     def _decide(self, episode: Episode, belief: Belief, task: int | None, run: Run) -> Moment | None:

@@ -68,7 +68,8 @@ def dynamic(experiment: Experiment, found: Findings) -> Part:
     left = (
         "Left to itself, even told every shape, the local rule forgets what it gave up and may walk to and "
         f"fro: it brings {alone[Outcome.REACHED]} of the same {tally.episodes} episodes to the goal, "
-        f"replanning {tally.outcomes[Outcome.REACHED]}."
+        f"replanning {tally.outcomes[Outcome.REACHED]}. Of the {tally.outcomes[Outcome.NO_ROUTE]} episodes "
+        f"that end with no route left, {tally.hopeless} have none in the whole maze, whatever the subtasks."
     )
     ends = tuple((outcome.value, tally.outcomes[outcome], alone[outcome]) for outcome in Outcome)
     looks = ((tally.looks, tally.misread, share(tally.misread, tally.looks)),)

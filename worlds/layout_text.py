@@ -12,6 +12,7 @@ from typing import NoReturn
 
 from worlds.errors import LayoutError, UserError
 from worlds.layout import KINDS, SIZES, Appears, Cell, Edge, Kind, Layout, Obstacle, Size, edge
+from worlds.layout_checks import layout_faults
 
 _MARK = re.compile(r"[TGD][A-Za-z0-9_]*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
@@ -108,9 +109,8 @@ class _Parser:
             obstacles=tuple(self.obstacles),
             chosen=self._chosen(),
         )
-        self._check_doors(layout)
-        self._check_reach(layout)
-        self._check_obstacles(layout)
+        for fault in layout_faults(layout, self.lines, [number for number, _ in self.grid]):
+            self.fail(*fault)
         return layout
 
     def _split(self, text: str) -> list[tuple[int, list[str]]]:
@@ -308,57 +308,6 @@ class _Parser:
             f"cannot read when the obstacle appears: {' '.join(words)!r}",
             "write 'at start', 'at step N', 'when robot R,C' or 'when doors open'",
         )
-
-    def _check_doors(self, layout: Layout) -> None:
-        """Hold that every door has its grid, and every D mark a door."""
-        for door in sorted(layout.doors):
-            named = [name for name, cell in layout.thresholds.items() if cell in door]
-            if len(named) != 1:
-                self.fail(
-                    self.grid[door[0].row][0],
-                    f"missing mark: the door between {door[0]} and {door[1]} needs one D mark beside it, "
-                    f"and has {len(named)}",
-                    "mark the grid behind the door D1, D2, ...",
-                )
-        for name, cell in layout.thresholds.items():
-            if not any(cell in door for door in layout.doors):
-                self.fail(
-                    self.lines[name], f"{name} is not beside a door", "write ':' between it and its neighbour"
-                )
-
-    def _check_reach(self, layout: Layout) -> None:
-        """Hold that triggers can be reached with doors shut, and goals with doors open."""
-        for marks, doors_open, state in ((layout.triggers, False, "shut"), (layout.goals, True, "open")):
-            reach = layout.reach([layout.start], doors_open=doors_open)
-            for name, cell in marks.items():
-                if cell not in reach:
-                    self.fail(
-                        self.lines[name],
-                        f"unreachable: {name} cannot be reached from start {layout.start} with doors {state}",
-                        "move it, open a wall, or move the start",
-                    )
-        if layout.start == layout.triggers[layout.trigger]:
-            self.fail(
-                self.lines["start"], f"the robot starts on its trigger {layout.trigger}", "start it elsewhere"
-            )
-
-    def _check_obstacles(self, layout: Layout) -> None:
-        """Hold that what appears at the start has room there."""
-        taken: dict[Cell, str] = {layout.start: "the robot"}
-        for obstacle in layout.obstacles:
-            if obstacle.appears.event == "start":
-                number = self.lines[obstacle.name]
-                if obstacle.cell in taken:
-                    self.fail(
-                        number, f"{obstacle.name} appears on {taken[obstacle.cell]}", "move one of the two"
-                    )
-                if obstacle.cell in layout.thresholds.values():
-                    self.fail(
-                        number,
-                        f"{obstacle.name} appears in a door that is shut at the start",
-                        "move it, or let it appear 'when doors open'",
-                    )
-                taken[obstacle.cell] = obstacle.name
 
 
 def _misspelt_key(words: list[str], section: str) -> bool:

@@ -60,7 +60,7 @@ class Stream:
         return (self.bits() >> 11) * 2.0**-53
 
     def between(self, low: float, high: float) -> float:
-        """Return a float in [low, high)."""
+        """Return a float from `low` to `high`, which rounding alone can reach."""
         return low + (high - low) * self.uniform()
 
     def below(self, n: int) -> int:

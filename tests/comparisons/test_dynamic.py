@@ -27,7 +27,7 @@ def carry_out(learnt: PairLearner, episode: Episode) -> tuple[Run, Tally]:
     oracle, local = Replanner(MAZE, learnt.grounded), LocalRule(MAZE, learnt.learner)
     robot = Robot(MAZE, learnt.grounded, Replanning(oracle, learnt.learner), Sight(MAZE, Truth()))
     run, tally = robot.run(episode), Tally()
-    tally.add(run, [judge(oracle, local, met) for met in run.encounters if met.affordance.on_route])
+    tally.add(run, [judge(oracle, local, met) for met in run.encounters if met.affordance.on_route], oracle)
     return run, tally
 
 
@@ -92,6 +92,16 @@ def test_the_example_run_gives_table_4(learnt: PairLearner) -> None:
     assert tally.globally_optimal(Replanner(MAZE, learnt.grounded)) == 4
 
 
+def test_no_route_is_told_apart_from_no_way_at_all(learnt: PairLearner) -> None:
+    """Cubes in both doors' grids leave no way; a wall of cubes in room B leaves one around through room A."""
+    both = [Obstacle("C1", "cube", Cell(2, 3)), Obstacle("C2", "cube", Cell(5, 3))]
+    run, tally = carry_out(learnt, Episode(MAZE, "T4", "G2", MAZE.start, both))
+    assert (run.outcome, tally.hopeless) == (Outcome.NO_ROUTE, 1)
+    wall = [Obstacle(f"C{col}", "cube", Cell(4, col)) for col in range(4, 8)]
+    run, tally = carry_out(learnt, Episode(MAZE, "T4", "G2", MAZE.start, wall))
+    assert (run.outcome, tally.hopeless) == (Outcome.NO_ROUTE, 0)
+
+
 @pytest.mark.slow
 def test_replanning_is_optimal_in_every_random_episode(learnt: PairLearner) -> None:
     """In 150 episodes of the learnt pair every affordance is proved, and every episode has its end."""
@@ -104,7 +114,8 @@ def test_replanning_is_optimal_in_every_random_episode(learnt: PairLearner) -> N
         if start == MAZE.triggers["T4"]:
             continue
         run = robot.run(Episode(MAZE, "T4", "G2", start, drawn.obstacles.values()))
-        total.add(run, [judge(oracle, local, met) for met in run.encounters if met.affordance.on_route])
+        met = [encounter for encounter in run.encounters if encounter.affordance.on_route]
+        total.add(run, [judge(oracle, local, encounter) for encounter in met], oracle)
     assert total.replanned_optimal == len(total.verdicts) > 100
     assert 0 < total.local_optimal < len(total.verdicts)
     assert total.outcomes[Outcome.WRONG_SHAPE] == total.misread == 0
