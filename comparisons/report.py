@@ -13,10 +13,9 @@ import cv2
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from comparisons.style import png_bytes, svg_text
+from comparisons.style import Picture
 
 _NUMBER: Final = re.compile(r"[-+\N{MINUS SIGN}]?\d[\d,.]*( ?(%|s|ms))?( of \d+| ?/ ?\d+)?")
 _NOTHING: Final = "\N{EN DASH}"
@@ -119,15 +118,15 @@ class Report:
     lead: str = ""
 
 
-def render(report: Report, figures: Mapping[str, Figure]) -> str:
+def render(report: Report, pictures: Mapping[str, Picture]) -> str:
     """Return a report as one HTML page that needs nothing but itself; the same input gives the same text.
 
     Parameters
     ----------
     report
         What to show. Its texts are plain: markup in them is shown, not followed.
-    figures
-        The figures that its sections name.
+    pictures
+        The figures that its sections name, drawn.
 
     Raises
     ------
@@ -144,7 +143,7 @@ def render(report: Report, figures: Mapping[str, Figure]) -> str:
         autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
     )
     source = files("comparisons").joinpath("templates", "report.html.j2").read_text(encoding="utf-8")
-    sections = _sections(report.sections, figures)
+    sections = _sections(report.sections, pictures)
     page = environment.from_string(source).render(
         title=report.title,
         lead=report.lead,
@@ -155,20 +154,20 @@ def render(report: Report, figures: Mapping[str, Figure]) -> str:
     return page.rstrip() + "\n"
 
 
-def _sections(sections: Sequence[Section], figures: Mapping[str, Figure]) -> list[dict[str, Any]]:
+def _sections(sections: Sequence[Section], pictures: Mapping[str, Picture]) -> list[dict[str, Any]]:
     """Return what the template needs of each section; figures and tables are numbered throughout."""
     out: list[dict[str, Any]] = []
     figure_number = table_number = 0
     for i, section in enumerate(sections, start=1):
         shown = []
         for name, caption in section.figures:
-            if name not in figures:
-                known = ", ".join(figures) or "none"
+            if name not in pictures:
+                known = ", ".join(pictures) or "none"
                 raise ValueError(
                     f"section {section.title!r} names the figure {name!r}, which is not given ({known})"
                 )
             figure_number += 1
-            picture = _picture(figures[name], f"f{figure_number}", caption)
+            picture = _picture(pictures[name], f"f{figure_number}", caption)
             shown.append({"number": figure_number, "caption": caption, "picture": picture})
         tables = []
         for table in section.tables:
@@ -214,11 +213,11 @@ def _cell(value: Value) -> dict[str, Any]:
             return {"text": text, "number": _NUMBER.fullmatch(text) is not None, "verdict": ""}
 
 
-def _picture(figure: Figure, prefix: str, caption: str) -> Markup:
+def _picture(picture: Picture, prefix: str, caption: str) -> Markup:
     """Return a figure as inline SVG or as a PNG in an `img`, whichever is shorter."""
-    width = round(_PIXELS * float(figure.get_figwidth()))
-    svg = _inline_svg(svg_text(figure), prefix, caption, width)
-    png = Markup('<img alt="{}" width="{}" src="{}">').format(caption, width, _data_url(png_bytes(figure)))
+    width = round(_PIXELS * picture.width)
+    svg = _inline_svg(picture.svg, prefix, caption, width)
+    png = Markup('<img alt="{}" width="{}" src="{}">').format(caption, width, _data_url(picture.png))
     return min(svg, png, key=len)
 
 

@@ -18,7 +18,7 @@ from comparisons.experiment import Experiment, Spec, Track
 from comparisons.report import render
 from comparisons.results import find, results
 from comparisons.story import tell
-from comparisons.style import save_figure
+from comparisons.style import picture
 from worlds import UserError
 
 T = TypeVar("T")
@@ -59,9 +59,11 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
         content = results(spec, experiment.layout, experiment.grounded, found)
         report, figures = tell(experiment, found)
         (directory / "figures").mkdir()
+        pictures = {}
         for name in progress.track(figures, description="drawing figures"):
-            save_figure(figures[name], directory / "figures", name)
-        (directory / "report.html").write_text(render(report, figures), encoding="utf-8")
+            pictures[name] = picture(figures[name])
+            pictures[name].save(directory / "figures", name)
+        (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
         times = {"experiment": searched - begun, "report": process_time() - searched}
         for name, data in (("results", content), ("times", times)):
             text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import string
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from functools import wraps
 from io import BytesIO
 from pathlib import Path
@@ -109,34 +110,41 @@ def grid_of(count: int, most_columns: int) -> tuple[int, int]:
     return -(-count // columns), columns
 
 
-def svg_text(figure: Figure) -> str:
-    """Return a figure as SVG; the same figure gives the same text."""
-    buffer = BytesIO()
-    empty = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    with house_style():
-        figure.savefig(buffer, format="svg", metadata=empty)
-    return buffer.getvalue().decode("utf-8")
+@dataclass(frozen=True)
+class Picture:
+    """A figure drawn once: as SVG text, as a PNG file's bytes, and its width in inches."""
+
+    svg: str
+    png: bytes
+    width: float
+
+    def save(self, directory: Path, name: str) -> tuple[Path, Path]:
+        """Write ``name.png`` and ``name.svg`` into an existing folder; return the two paths."""
+        png, svg = directory / f"{name}.png", directory / f"{name}.svg"
+        png.write_bytes(self.png)
+        svg.write_text(self.svg, encoding="utf-8", newline="\n")
+        return png, svg
 
 
-def png_bytes(figure: Figure) -> bytes:
-    """Return a figure as PNG at `PNG_DPI`; the same figure gives the same bytes."""
-    buffer = BytesIO()
+def picture(figure: Figure) -> Picture:
+    """Draw a figure; the same figure gives the same bytes, whatever matplotlib is set to.
+
+    Examples
+    --------
+    >>> drawn = picture(Figure((1, 1)))
+    >>> drawn.svg.startswith("<?xml"), drawn.png[1:4], drawn.width
+    (True, b'PNG', 1.0)
+    """
+    svg, png = BytesIO(), BytesIO()
     with house_style():
-        figure.savefig(buffer, format="png", dpi=PNG_DPI, metadata={"Software": None})
-    return buffer.getvalue()
+        empty = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+        figure.savefig(svg, format="svg", metadata=empty)
+        figure.savefig(png, format="png", dpi=PNG_DPI, metadata={"Software": None})
+    return Picture(svg.getvalue().decode("utf-8"), png.getvalue(), float(figure.get_figwidth()))
 
 
 def save_figure(figure: Figure, directory: Path, name: str) -> tuple[Path, Path]:
-    """Write a figure as ``name.png`` and ``name.svg``; return the two paths.
-
-    Parameters
-    ----------
-    figure
-        What to write.
-    directory
-        An existing folder.
-    name
-        File name without its ending.
+    """Draw a figure and write it as ``name.png`` and ``name.svg``; return the two paths.
 
     Examples
     --------
@@ -145,7 +153,4 @@ def save_figure(figure: Figure, directory: Path, name: str) -> tuple[Path, Path]
     ...     [path.name for path in save_figure(Figure((1, 1)), Path(folder), "empty")]
     ['empty.png', 'empty.svg']
     """
-    png, svg = directory / f"{name}.png", directory / f"{name}.svg"
-    png.write_bytes(png_bytes(figure))
-    svg.write_text(svg_text(figure), encoding="utf-8", newline="\n")
-    return png, svg
+    return picture(figure).save(directory, name)

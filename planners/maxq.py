@@ -99,7 +99,9 @@ class MaxQ:
 
     def q(self, task: int, state: int, k: int) -> float:
         """Return Q(task, state, k-th child) = V(child, state) + C(task, state, child) (equation 3)."""
-        return self.value(self._children[task][k], state) + self.c(task, state, k)
+        child = self._children[task][k]
+        value = self.reward[child] if child < self._primitives else self.value(child, state)
+        return value + self.completion[task][k][self._row[task][k][state]]
 
     def c(self, task: int, state: int, k: int) -> float:
         """Return C(task, state, k-th child), the value of completing the task after that child."""

@@ -18,7 +18,7 @@ from matplotlib.patches import FancyBboxPatch
 from comparisons import figures
 from comparisons.figures_maze import Drawn, lanes
 from comparisons.figures_routes import drawn
-from comparisons.style import svg_text
+from comparisons.style import picture
 from worlds import ACTIONS, DELTAS, Cell, MazeState, load_layout
 
 MAZE = load_layout("two_rooms")
@@ -124,12 +124,12 @@ def test_every_figure_is_drawn_here() -> None:
 def test_another_process_and_other_settings_give_the_same_svg() -> None:
     """Neither the process nor the user's own matplotlib settings change a figure."""
     code = (
-        "from comparisons.figures import value_counts_figure as draw; from comparisons.style import svg_text;"
-        "print(svg_text(draw([('flat Q', 4096), ('leaves', 4)])), end='')"
+        "from comparisons.figures import value_counts_figure as draw; from comparisons.style import picture;"
+        "print(picture(draw([('flat Q', 4096), ('leaves', 4)])).svg, end='')"
     )
     other = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True)  # noqa: S603
     with rc_context({"font.size": 20, "svg.fonttype": "none", "axes.facecolor": "red"}):
-        assert svg_text(DRAWINGS["value_counts"]()) == other.stdout
+        assert picture(DRAWINGS["value_counts"]()).svg == other.stdout
 
 
 def test_saving_writes_a_png_of_200_dots_an_inch_and_an_svg_without_a_date(tmp_path: Path) -> None:

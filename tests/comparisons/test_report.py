@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from comparisons.figures import value_counts_figure
 from comparisons.report import Replay, ReplayFrame, Report, Section, Table, Verdict, render
+from comparisons.style import Picture, picture
 
 EVIL = '<script>alert("&")</script>'
 VOID = {"meta", "link", "img", "input", "br"}
@@ -22,15 +23,16 @@ def frame(value: int) -> np.ndarray:
     return image
 
 
-def drawings() -> dict[str, Figure]:
+def drawings() -> dict[str, Picture]:
     """Return two figures that are shorter as SVG, and one that is shorter as PNG."""
     dense = Figure((2, 2))
     dense.add_subplot().plot(np.arange(20_000) % 97, np.arange(20_000) % 89)
-    return {
+    figures = {
         "values": value_counts_figure([("flat Q", 4096), ("leaves", 4)]),
         "steps": value_counts_figure([(EVIL, 3), ("leaves", 4)]),
         "dense": dense,
     }
+    return {name: picture(figure) for name, figure in figures.items()}
 
 
 def report() -> Report:
