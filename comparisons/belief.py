@@ -23,9 +23,10 @@ class Belief:
         self._touched: frozenset[int] = frozenset()
 
     def see(self, action: int, detection: Detection) -> int | None:
-        """Take in a look ahead in the direction of `action`; return the cell of an obstacle seen there.
+        """Take in a look ahead in the direction of `action`; return the cell of the obstacle in view.
 
-        What is seen beyond a wall or a shut door cannot be there and is not believed.
+        What is seen beyond a wall or a shut door cannot be there and is not believed. A touched obstacle
+        stays, is in view whatever was seen, and hides what is behind it.
         """
         view = [ahead(self.layout, self.state, action, distance) for distance in range(1, REACH + 1)]
         at = None

@@ -38,7 +38,7 @@ def reproduce(
     perception
         Backend that tells shapes: hough, truth, or one that an installed package adds.
     seed
-        Names every random stream; the same seed gives the same results.json.
+        Seed of everything random; the same seed gives the same results.json.
     quick
         Fewer frames, pushes and random episodes, for a first look.
     layout

@@ -19,6 +19,7 @@ from comparisons.report import render
 from comparisons.results import find, results
 from comparisons.story import tell
 from comparisons.style import picture
+from hierarchy import mermaid
 from worlds import UserError
 
 T = TypeVar("T")
@@ -28,7 +29,7 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
     """Run the experiment and write its outputs to a new directory.
 
     The directory appears only once everything in it is complete: ``report.html``, ``results.json``,
-    ``times.json`` (CPU seconds, which no two runs share) and ``figures/``.
+    ``times.json`` (CPU seconds, which no two runs share), ``figures/`` and ``task_graph.mmd`` (Mermaid).
 
     Parameters
     ----------
@@ -63,6 +64,7 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
         for name in progress.track(figures, description="drawing figures"):
             pictures[name] = picture(figures[name])
             pictures[name].save(directory / "figures", name)
+        (directory / "task_graph.mmd").write_text(mermaid(experiment.grounded.graph), encoding="utf-8")
         (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
         times = {"experiment": searched - begun, "report": process_time() - searched}
         for name, data in (("results", content), ("times", times)):

@@ -119,7 +119,7 @@ def test_every_figure_comes_as_png_and_svg(made: tuple[Path, str]) -> None:
     assert names >= {"maze", "task_graph", "convergence", "step_counts", "trajectories", "confusion"}
     assert figures == sorted(f"{name}.{kind}" for name in names for kind in ("png", "svg"))
     entries = sorted(path.name for path in made[0].iterdir())
-    assert entries == ["figures", "report.html", "results.json", "times.json"]
+    assert entries == ["figures", "report.html", "results.json", "task_graph.mmd", "times.json"]
     assert [path.name for path in made[0].parent.iterdir()] == ["out"]
 
 
