@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from hierarchy.graph import TaskGraph, TaskGraphError
+from collections.abc import Mapping
+
+from hierarchy.graph import Task, TaskGraph, TaskGraphError
 from hierarchy.predicates import Param, ValueSet
-from worlds import ACTIONS, Layout, maze_variables
+from worlds import ACTIONS, Cell, Layout, maze_variables
 
 
 def two_rooms(layout: Layout, *, one_door_task: bool = False) -> TaskGraph:
@@ -41,39 +43,22 @@ def two_rooms(layout: Layout, *, one_door_task: bool = False) -> TaskGraph:
     first = layout.room(layout.start)
     second = frozenset(layout.cells) - layout.solid - first
     room_a, room_b = ValueSet("room A", first), ValueSet("room B", second)
-    target = {name: Param.over("target", marks) for name, marks in _targets(layout).items()}
     moves = " ".join(ACTIONS)
 
-    goto_trigger = graph.task(
-        "GotoTrigger",
-        target["trigger"],
-        until=robot.eq(target["trigger"]),
-        within=robot.isin(room_a),
-        uses=[robot],
-        do=moves,
-    )
+    def goto(name: str, marks: Mapping[str, Cell], room: ValueSet) -> Task:
+        target = Param.over("target", marks)
+        within = robot.isin(room)
+        return graph.task(name, target, until=robot.eq(target), within=within, uses=[robot], do=moves)
+
+    goto_trigger = goto("GotoTrigger", layout.triggers, room_a)
     if one_door_task:
         any_door = robot.isin(ValueSet("doors' grids", frozenset(layout.thresholds.values())))
         goto_door = graph.task("GotoDoor", until=any_door, within=robot.isin(room_a), uses=[robot], do=moves)
         to_doors = [goto_door()]
     else:
-        goto_door = graph.task(
-            "GotoDoor",
-            target["door"],
-            until=robot.eq(target["door"]),
-            within=robot.isin(room_a),
-            uses=[robot],
-            do=moves,
-        )
+        goto_door = goto("GotoDoor", layout.thresholds, room_a)
         to_doors = [goto_door(target=cell) for cell in layout.thresholds.values()]
-    goto_goal = graph.task(
-        "GotoGoal",
-        target["goal"],
-        until=robot.eq(target["goal"]),
-        within=robot.isin(room_b),
-        uses=[robot],
-        do=moves,
-    )
+    goto_goal = goto("GotoGoal", layout.goals, room_b)
     through = [door.when(doors.eq("open")).when(robot.isin(room_a)) for door in to_doors]
     if not one_door_task:
         through = [door.using(goal) for door in through]  # it ends at its door, wherever it began
@@ -88,7 +73,3 @@ def two_rooms(layout: Layout, *, one_door_task: bool = False) -> TaskGraph:
         ],
     )
     return graph
-
-
-def _targets(layout: Layout) -> dict[str, dict[str, object]]:
-    return {"trigger": {**layout.triggers}, "door": {**layout.thresholds}, "goal": {**layout.goals}}

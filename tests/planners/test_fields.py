@@ -3,6 +3,7 @@ from dataclasses import replace
 import networkx as nx
 import numpy as np
 import pytest
+from beliefs import any_maze_graph
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
@@ -11,9 +12,9 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import dijkstra
 from strategies import maze_layouts
 
-from hierarchy import TaskGraph, ValueSet, ground, two_rooms
+from hierarchy import ground, two_rooms
 from planners import UNREACHED, Field, certify, distance_field, flat_field, task_field
-from worlds import ACTIONS, Layout, load_layout, maze_model, maze_variables
+from worlds import load_layout, maze_model
 
 Problem = tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]
 
@@ -28,23 +29,11 @@ def _problems(draw: st.DrawFn) -> Problem:
     return successors, goal, allowed
 
 
-def _graph(layout: Layout) -> TaskGraph:
-    """Return a task that reaches the trigger within the start's room, below a root that may do anything."""
-    graph = TaskGraph("any maze", maze_variables(layout), ACTIONS)
-    robot, trigger, goal, doors = graph.variables
-    room = robot.isin(ValueSet("the room", layout.room(layout.start)))
-    moves = " ".join(ACTIONS)
-    near = graph.task("Near", until=robot.eq(trigger), within=room, uses=[robot, trigger], do=moves)
-    end = doors.eq("open") & robot.eq(goal)
-    graph.task("Root", until=end, uses=[robot, trigger, goal, doors], do=[near(), *ACTIONS])
-    return graph
-
-
 @st.composite
 def _maze_fields(draw: st.DrawFn) -> Field:
     layout = draw(maze_layouts(most=4))
     model = maze_model(layout)
-    grounded = ground(_graph(layout), model)
+    grounded = ground(any_maze_graph(layout), model)
     if draw(st.booleans()):
         return task_field(model, grounded.node("Near"))
     return flat_field(model, grounded.nodes[grounded.root].terminal)

@@ -5,18 +5,18 @@ from dataclasses import replace
 
 import networkx as nx
 import pytest
+from beliefs import MAZE, any_maze_graph, knowing, number
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from strategies import ACTION_NUMBERS, maze_layouts
 
-from hierarchy import Call, TaskGraph, ValueSet, ground, two_rooms
+from hierarchy import Call, TaskGraph, ground, two_rooms
 from planners import Plan, Replanner, prove, verify
 from worlds import (
     ACTIONS,
     Cell,
     Layout,
     MazeState,
-    load_layout,
     maze_model,
     maze_variables,
     parse_layout,
@@ -24,20 +24,7 @@ from worlds import (
 )
 
 NORTH, SOUTH, WEST, EAST = range(4)
-MAZE = load_layout("two_rooms")
 END = "end"  # the node behind every state in which the task has ended
-
-
-def _graph(layout: Layout) -> TaskGraph:
-    """Return Near, which reaches the trigger within the start's room, below a root that may do anything."""
-    graph = TaskGraph("any maze", maze_variables(layout), ACTIONS)
-    robot, trigger, goal, doors = graph.variables
-    room = robot.isin(ValueSet("the room", layout.room(layout.start)))
-    moves = " ".join(ACTIONS)
-    near = graph.task("Near", until=robot.eq(trigger), within=room, uses=[robot, trigger], do=moves)
-    end = doors.eq("open") & robot.eq(goal)
-    graph.task("Root", until=end, uses=[robot, trigger, goal, doors], do=[near(), *ACTIONS])
-    return graph
 
 
 def _ended(task: str, state: MazeState) -> bool:
@@ -96,7 +83,7 @@ def _problems(draw: st.DrawFn) -> tuple[Replanner, str, MazeState]:
         cubes=frozenset(things[2:]),
         spheres=frozenset(things[:2]),
     )
-    oracle = Replanner(layout, ground(_graph(layout), maze_model(layout)))
+    oracle = Replanner(layout, ground(any_maze_graph(layout), maze_model(layout)))
     return oracle, draw(st.sampled_from(["Near", "Root"])), belief
 
 
@@ -186,20 +173,6 @@ def oracle() -> Replanner:
     return Replanner(MAZE, ground(two_rooms(MAZE), maze_model(MAZE)))
 
 
-def _cell(text: str) -> int:
-    row, col = text.split(",")
-    return int(row) * MAZE.cols + int(col)
-
-
-def _cells(text: str) -> frozenset[int]:
-    return frozenset(_cell(word) for word in text.split())
-
-
-def _belief(robot: str, cubes: str = "", spheres: str = "", *, doors_open: bool = False) -> MazeState:
-    marks = MAZE.number(MAZE.triggers["T4"]), MAZE.number(MAZE.goals["G2"])
-    return MazeState(_cell(robot), *marks, doors_open, _cells(cubes), _cells(spheres))
-
-
 def _plan(oracle: Replanner, task: str, belief: MazeState) -> tuple[list[str], set[str]]:
     plan = oracle.plan(oracle.grounded.place(task), belief)
     assert plan is not None
@@ -208,20 +181,20 @@ def _plan(oracle: Replanner, task: str, belief: MazeState) -> tuple[list[str], s
 
 def test_an_open_room_by_hand(oracle: Replanner) -> None:
     """From 4,0 to T4 = 6,1: South and East are both optimal, and South comes first."""
-    assert _plan(oracle, "GotoTrigger(T4)", _belief("4,0")) == (["South", "South", "East"], {"South", "East"})
+    assert _plan(oracle, "GotoTrigger(T4)", knowing("4,0")) == (["South", "South", "East"], {"South", "East"})
 
 
 def test_a_sphere_on_the_way_is_pushed(oracle: Replanner) -> None:
     """It rolls South to 7,0, out of the way, and costs nothing."""
-    belief = _belief("4,0", cubes="4,1", spheres="5,0")
+    belief = knowing("4,0", cubes="4,1", spheres="5,0")
     assert _plan(oracle, "GotoTrigger(T4)", belief) == (["South", "South", "East"], {"South"})
 
 
 def test_a_wedged_sphere_blocks_like_a_cube(oracle: Replanner) -> None:
     """A cube behind it holds it: the way leads around by the East."""
-    belief = _belief("4,0", cubes="6,0", spheres="5,0")
+    belief = knowing("4,0", cubes="6,0", spheres="5,0")
     assert _plan(oracle, "GotoTrigger(T4)", belief) == (["East", "South", "South"], {"East"})
-    as_cube = _belief("4,0", cubes="6,0 5,0")
+    as_cube = knowing("4,0", cubes="6,0 5,0")
     assert _plan(oracle, "GotoTrigger(T4)", as_cube) == _plan(oracle, "GotoTrigger(T4)", belief)
 
 
@@ -231,11 +204,11 @@ def test_a_sphere_may_be_pushed_into_the_way(oracle: Replanner) -> None:
     That takes 4 steps (South, West, South, East) and so does the way around the sphere by either side.
     With cubes at 5,0 and 5,2 the robot would have to come back out: 8 steps in place of 6.
     """
-    belief = _belief("4,1", cubes="7,1", spheres="5,1")
+    belief = knowing("4,1", cubes="7,1", spheres="5,1")
     actions, firsts = _plan(oracle, "GotoTrigger(T4)", belief)
     assert actions == ["South", "West", "South", "East"]
     assert firsts == {"South", "West", "East"}
-    walled = _belief("4,1", cubes="7,1 5,0 5,2", spheres="5,1")
+    walled = knowing("4,1", cubes="7,1 5,0 5,2", spheres="5,1")
     assert _plan(oracle, "GotoTrigger(T4)", walled)[0] == ["East", "East", "South", "South", "West", "West"]
 
 
@@ -261,7 +234,7 @@ def test_a_cube_that_closes_a_corridor_leaves_no_way() -> None:
 
 def test_the_root_s_plan_opens_the_doors_on_its_way(oracle: Replanner) -> None:
     """From 5,1 the whole task takes 1 step to T4, 4 to D2 and 5 to G2."""
-    plan = oracle.plan(oracle.grounded.root, _belief("5,1"))
+    plan = oracle.plan(oracle.grounded.root, knowing("5,1"))
     assert plan is not None
     assert len(plan.actions) == 1 + 4 + 5
     assert plan.first_actions == {SOUTH}
@@ -269,7 +242,7 @@ def test_the_root_s_plan_opens_the_doors_on_its_way(oracle: Replanner) -> None:
 
 def test_a_task_that_has_ended_needs_no_step(oracle: Replanner) -> None:
     """The plan is empty, no action is its first, and the certificate stands."""
-    belief = _belief("6,1", doors_open=True)
+    belief = knowing("6,1", doors_open=True)
     task = oracle.grounded.place("GotoTrigger(T4)")
     plan = oracle.plan(task, belief)
     assert plan is not None
@@ -279,7 +252,7 @@ def test_a_task_that_has_ended_needs_no_step(oracle: Replanner) -> None:
 
 def test_a_task_does_not_run_outside_its_working_space(oracle: Replanner) -> None:
     """In room B there is no plan to the trigger, even through the open doors."""
-    assert oracle.plan(oracle.grounded.place("GotoTrigger(T4)"), _belief("2,4", doors_open=True)) is None
+    assert oracle.plan(oracle.grounded.place("GotoTrigger(T4)"), knowing("2,4", doors_open=True)) is None
 
 
 def _faults(oracle: Replanner, belief: MazeState, plan: Plan) -> tuple[str, ...]:
@@ -289,12 +262,12 @@ def _faults(oracle: Replanner, belief: MazeState, plan: Plan) -> tuple[str, ...]
 
 def test_wrong_certificates_by_hand(oracle: Replanner) -> None:
     """Each way of being wrong is named."""
-    belief = _belief("5,0")
+    belief = knowing("5,0")
     plan = oracle.plan(oracle.grounded.place("GotoTrigger(T4)"), belief)
     assert plan is not None
     start = (belief.robot, False, frozenset[int]())
-    beside = (_cell("5,1"), False, frozenset[int]())
-    ended = (_cell("6,1"), True, frozenset[int]())
+    beside = (number("5,1"), False, frozenset[int]())
+    ended = (number("6,1"), True, frozenset[int]())
     assert plan.actions == (SOUTH, EAST)
     assert _faults(oracle, belief, replace(plan, actions=(EAST, SOUTH))) == (), "the other shortest plan"
 
@@ -316,7 +289,7 @@ def test_wrong_certificates_by_hand(oracle: Replanner) -> None:
 
 def test_a_plan_may_not_leave_the_working_space(oracle: Replanner) -> None:
     """Through D1 and back is refused for GotoTrigger, whatever comes of it."""
-    belief = _belief("2,3", doors_open=True)
+    belief = knowing("2,3", doors_open=True)
     task = oracle.grounded.place("GotoTrigger(T4)")
     plan = oracle.plan(task, belief)
     assert plan is not None
@@ -326,7 +299,7 @@ def test_a_plan_may_not_leave_the_working_space(oracle: Replanner) -> None:
 
 def test_areas_differ_by_trigger_and_goal(oracle: Replanner) -> None:
     """The root's end is the belief's own goal, also after another goal was asked for."""
-    belief = _belief("2,4", doors_open=True)
+    belief = knowing("2,4", doors_open=True)
     other = replace(belief, goal=MAZE.number(MAZE.goals["G4"]))
     lengths = []
     for one in (belief, other, belief):
@@ -346,8 +319,8 @@ def test_a_plan_takes_only_the_actions_of_its_task() -> None:
     do = [lame().when(doors.eq("closed")), guarded().when(doors.eq("open"))]
     graph.task("Root", until=robot.eq(goal), uses=[robot, trigger, goal, doors], do=do)
     oracle = Replanner(MAZE, ground(graph, maze_model(MAZE)))
-    assert oracle.plan(oracle.grounded.place("Lame"), _belief("1,2")) is None
-    plan = oracle.plan(oracle.grounded.place("Guarded"), _belief("5,0"))
+    assert oracle.plan(oracle.grounded.place("Lame"), knowing("1,2")) is None
+    plan = oracle.plan(oracle.grounded.place("Guarded"), knowing("5,0"))
     assert plan is not None
     assert [ACTIONS[action] for action in plan.actions] == ["South", "East"]
     assert plan.first_actions == {SOUTH}
