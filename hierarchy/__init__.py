@@ -4,7 +4,7 @@ from hierarchy.check import Finding, check, checked
 from hierarchy.counts import ValueCounts, value_counts
 from hierarchy.drawing import mermaid, task_graph_picture
 from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
-from hierarchy.grounding import GroundCall, GroundGraph, GroundTask, ground
+from hierarchy.grounding import GroundCall, GroundGraph, GroundTask, Leaf, ground
 from hierarchy.predicates import ALWAYS, Constant, Param, Predicate, Term, ValueSet, Var
 from hierarchy.two_rooms import two_rooms
 
@@ -16,6 +16,7 @@ __all__ = [
     "GroundCall",
     "GroundGraph",
     "GroundTask",
+    "Leaf",
     "Param",
     "Predicate",
     "Task",

@@ -77,6 +77,8 @@ def _declaration(graph: TaskGraph) -> Iterator[Finding]:
                 )
         yield from _predicate(graph, task, task.name, "until", task.until)
         yield from _predicate(graph, task, task.name, "within", task.within)
+        yield from _predicate(graph, task, task.name, "start", task.start)
+        yield from _predicate(graph, task, task.name, "goal", task.goal)
         if not task.do:
             yield Finding("no children", task.name, "it has nothing to do", "give it children with do=...")
         for call in task.do:
@@ -201,16 +203,7 @@ def _straying(
     child = grounded.nodes[call.child]
     if not child.calls:
         return
-    passed = called.copy()
-    moves = list(_moves(grounded, child))
-    while True:
-        more = passed.copy()
-        for action, available in moves:
-            more[grounded.model.successors[passed & available & ~child.terminal, action]] = True
-        if (more == passed).all():
-            break
-        passed = more
-    strays = passed & child.terminal & ~task.live & ~task.terminal
+    strays = _passed(grounded, child, called) & child.terminal & ~task.live & ~task.terminal
     if strays.any():
         yield Finding(
             "strays",
@@ -228,6 +221,17 @@ def _ending(
         problem = f"its termination ({grounded.graph.tasks[task.task].until}) never holds"
         yield Finding("never ends", task.name, problem, "mend its until")
         return
+    short = task.terminal & ~task.goal & _passed(grounded, task, called)
+    if short.any() and task.pseudo_reward is None:
+        yield Finding(
+            "ends short",
+            task.name,
+            f"it can end without reaching its goal, such as in {_describe(grounded, short)}",
+            "give it a pseudo_reward below what finishing costs, or a learner will quit early",
+        )
+    if task.terminal[reachable].any() and not (task.goal & reachable).any():
+        problem = f"its goal ({grounded.graph.tasks[task.task].goal}) holds at none of its terminations"
+        yield Finding("no goal", task.name, problem, "mend its goal or its until")
     stuck = task.live & reachable & ~np.logical_or.reduce([call.available for call in task.calls])
     if stuck.any():
         yield Finding(
@@ -246,6 +250,19 @@ def _ending(
         )
 
 
+def _passed(grounded: GroundGraph, task: GroundTask, called: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return the states that a task may pass through or end in when called in `called`."""
+    passed = called.copy()
+    moves = list(_moves(grounded, task))
+    while True:
+        more = passed.copy()
+        for action, available in moves:
+            more[grounded.model.following(passed & available & ~task.terminal, action)] = True
+        if (more == passed).all():
+            return passed
+        passed = more
+
+
 def _can_end(grounded: GroundGraph, task: GroundTask) -> NDArray[np.bool_]:
     """Return the states from which the actions below a task can end it, shape (states,)."""
     moves = list(_moves(grounded, task))
@@ -253,7 +270,7 @@ def _can_end(grounded: GroundGraph, task: GroundTask) -> NDArray[np.bool_]:
     while True:
         more = ends.copy()
         for action, available in moves:
-            more |= available & ends[grounded.model.successors[:, action]]
+            more |= available & grounded.model.may_reach(ends)[:, action]
         if (more == ends).all():
             return ends
         ends = more

@@ -30,7 +30,7 @@ class ValueCounts:
     root
         Completion values of the root, each edge by its own relevant variables.
     leaves
-        Values of the primitive actions (leaf irrelevance, equation 7).
+        Values of the primitive actions, one for each expected reward (leaf irrelevance, equation 7).
     unabstracted_tasks, unabstracted_subtasks
         Without abstraction: flat x tasks between root and actions, and flat x calls of the root.
     """
@@ -95,7 +95,7 @@ def value_counts(grounded: GroundGraph, *, ignoring: Sequence[str] = ()) -> Valu
         per_task=per_task,
         per_task_live=per_task_live,
         root=sum(_root_edge(grounded, call, reachable) for call in graph.root.do),
-        leaves=sum(_leaf(model.rewards[reachable, action]) for action in range(actions)),
+        leaves=sum(_distinct(node.leaf.projection, reachable) for node in grounded.nodes if node.leaf),
         unabstracted_tasks=flat * len(between),
         unabstracted_subtasks=flat * len(graph.root.do),
     )
@@ -110,8 +110,3 @@ def _root_edge(grounded: GroundGraph, call: Call, reachable: NDArray[np.bool_]) 
     bound = [edge for edge in grounded.nodes[grounded.root].calls if edge.call is call]
     made: NDArray[np.bool_] = np.logical_or.reduce([edge.available for edge in bound])
     return _distinct(bound[0].projection, made & reachable)
-
-
-def _leaf(rewards: NDArray[np.float64]) -> int:
-    """Return 1 if a primitive's reward is the same everywhere, else one value a state."""
-    return 1 if (rewards == rewards[0]).all() else int(rewards.size)

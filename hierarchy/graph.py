@@ -67,6 +67,9 @@ class Task:
     within: Predicate
     uses: tuple[str, ...]
     do: tuple[Call, ...]
+    start: Predicate = ALWAYS
+    goal: Predicate = ALWAYS
+    pseudo_reward: float | None = None
 
     def __call__(self, **binding: Term | Hashable) -> Call:
         """Bind parameters for a call.
@@ -131,6 +134,9 @@ class TaskGraph:
         do: str | Iterable[Call | str],
         uses: Iterable[Var],
         within: Predicate = ALWAYS,
+        start: Predicate = ALWAYS,
+        goal: Predicate = ALWAYS,
+        pseudo_reward: float | None = None,
     ) -> Task:
         """Add a task and return it.
 
@@ -150,6 +156,13 @@ class TaskGraph:
             Its working space: it can be called only here, and a primitive action of its own that would
             leave this space without ending the task is not available to it (section 5.3.1 of the paper:
             "its working space is an eight-by-four room").
+        start
+            Its initiation: it can be called only where this holds, too.
+        goal
+            Which of its terminations are good ones. Defaults to all.
+        pseudo_reward
+            What a learner is taught to expect of the other terminations (MAXQ-Q; Dietterich 2000,
+            section 3.3): below what finishing costs, lest the task learns to quit early.
 
         Raises
         ------
@@ -160,7 +173,17 @@ class TaskGraph:
             raise TaskGraphError(f"task {name}: the name is taken by another task or action; choose another")
         words = do.split() if isinstance(do, str) else do
         calls = tuple(Call(child) if isinstance(child, str) else child for child in words)
-        task = Task(name, params, until, within, tuple(variable.name for variable in uses), calls)
+        task = Task(
+            name,
+            params,
+            until,
+            within,
+            tuple(variable.name for variable in uses),
+            calls,
+            start,
+            goal,
+            pseudo_reward,
+        )
         self.tasks[name] = task
         return task
 

@@ -48,6 +48,22 @@ class GroundCall:
 
 
 @dataclass(frozen=True, eq=False)
+class Leaf:
+    """How a primitive action's value is stored: one value for each expected reward (leaf irrelevance).
+
+    Parameters
+    ----------
+    projection
+        Every state's row, shape (states,).
+    rows
+        Number of rows: of different expected rewards.
+    """
+
+    projection: NDArray[np.int64]
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
 class GroundTask:
     """A task with its parameters bound, or a primitive action (which has no calls).
 
@@ -63,8 +79,16 @@ class GroundTask:
         Where it has ended, shape (states,).
     live
         Where it is running: within its working space and not terminal, shape (states,).
+    initiation
+        Where it may be called: where it is live and its `start` holds, shape (states,).
+    goal
+        Where it has ended well: the terminal states in which its `goal` holds, shape (states,).
+    pseudo_reward
+        What it is taught to expect of ending elsewhere; None if it has no say in that.
     calls
         What it may do, in the order that breaks ties.
+    leaf
+        How a primitive action's value is stored; None for a task.
     """
 
     name: str
@@ -72,7 +96,11 @@ class GroundTask:
     binding: Binding
     terminal: Mask
     live: Mask
+    initiation: Mask
+    goal: Mask
+    pseudo_reward: float | None = None
     calls: tuple[GroundCall, ...] = ()
+    leaf: Leaf | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,8 +179,7 @@ class _Builder:
     def __init__(self, graph: TaskGraph, model: TransitionModel) -> None:
         self.graph = graph
         self.model = model
-        nowhere = np.zeros(model.index.size, dtype=np.bool_)
-        self.nodes = [GroundTask(a, a, (), nowhere, ~nowhere) for a in model.actions]
+        self.nodes = [_primitive(model, place) for place in range(len(model.actions))]
         self.places: dict[tuple[str, Binding], int] = {(a, ()): i for i, a in enumerate(model.actions)}
 
     def add(self, task: Task, binding: Binding) -> int:
@@ -170,8 +197,18 @@ class _Builder:
             for child_binding, where in self._bindings(call, values):
                 calls.append(self._call(task, call, child_binding, guard & where, within | terminal))
         label = ", ".join(str(value) for _, value in binding)
-        name = f"{task.name}({label})" if label else task.name
-        self.nodes.append(GroundTask(name, task.name, binding, terminal, live, tuple(calls)))
+        ground_task = GroundTask(
+            name=f"{task.name}({label})" if label else task.name,
+            task=task.name,
+            binding=binding,
+            terminal=terminal,
+            live=live,
+            initiation=live & task.start.bind(values).mask(index),
+            goal=terminal & task.goal.bind(values).mask(index),
+            pseudo_reward=task.pseudo_reward,
+            calls=tuple(calls),
+        )
+        self.nodes.append(ground_task)
         self.places[key] = len(self.nodes) - 1
         return self.places[key]
 
@@ -179,10 +216,10 @@ class _Builder:
         index = self.model.index
         if call.child in self.graph.tasks:
             child = self.add(self.graph.tasks[call.child], binding)
-            available = guard & self.nodes[child].live
+            available = guard & self.nodes[child].initiation
         else:
             child = self.places[call.child, ()]
-            available = guard & stays[self.model.successors[:, child]]
+            available = guard & self.model.must_reach(stays)[:, child]
         relevant = task.uses if call.relevant is None else call.relevant
         rows = int(np.prod([len(index.variable(name)) for name in relevant], dtype=np.int64))
         return GroundCall(child, available, relevant, index.project(relevant), rows, call)
@@ -206,3 +243,13 @@ class _Builder:
             for _, mask in chosen:
                 where &= mask
             yield tuple(zip(names, (constant for constant, _ in chosen), strict=True)), where
+
+
+def _primitive(model: TransitionModel, place: int) -> GroundTask:
+    """Return a primitive action as a node: it runs anywhere and has no end of its own."""
+    name = model.actions[place]
+    nowhere = np.zeros(model.index.size, dtype=np.bool_)
+    # Rounding keeps sums of the same outcomes in another order in one class.
+    values, rows = np.unique(model.rewards[:, place].round(9), return_inverse=True)
+    leaf = Leaf(rows.reshape(-1).astype(np.int64), values.size)
+    return GroundTask(name, name, (), nowhere, ~nowhere, ~nowhere, nowhere, leaf=leaf)

@@ -6,15 +6,19 @@ reads, and evaluates on one state or on all states at once.
 
 from __future__ import annotations
 
+import operator
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from worlds import StateIndex, Variable
 
+Relation = Literal["<", "<=", ">", ">="]
+_RELATIONS: Final = {"<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge}
 Values = Mapping[str, Hashable]
 """A state, or a binding, by name."""
 
@@ -66,6 +70,32 @@ class Term(ABC):
             If the value is not in this term's domain.
         """
         return Equal(self, other if isinstance(other, Term) else self.constant(other))
+
+    def ne(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term differs from another, or from a value."""
+        return ~self.eq(other)
+
+    def lt(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term stands before another, or before a value.
+
+        The order is that of the values themselves; they must all be comparable.
+        """
+        return self._ordered("<", other)
+
+    def le(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term stands before or equals another, or a value."""
+        return self._ordered("<=", other)
+
+    def gt(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term stands after another, or after a value."""
+        return self._ordered(">", other)
+
+    def ge(self, other: Term | Hashable) -> Predicate:
+        """Return the predicate that this term stands after or equals another, or a value."""
+        return self._ordered(">=", other)
+
+    def _ordered(self, relation: Relation, other: Term | Hashable) -> Predicate:
+        return Ordered(relation, self, other if isinstance(other, Term) else Constant(other))
 
     def isin(self, values: ValueSet | Iterable[Hashable]) -> Predicate:
         """Return the predicate that this term's value is one of `values`.
@@ -159,6 +189,10 @@ class Predicate(ABC):
         """Return the names of the parameters that the predicate reads."""
         return frozenset(term.name for term in self.terms() if isinstance(term, Param))
 
+    def implies(self, other: Predicate) -> Predicate:
+        """Return the predicate that the other holds wherever this one does."""
+        return Implies(self, other)
+
     def __and__(self, other: Predicate) -> Predicate:
         return AllOf((*_parts(self, AllOf), *_parts(other, AllOf)))
 
@@ -212,6 +246,61 @@ class Equal(Predicate):
     def holds(self, values: Values) -> bool:
         right = self.right.value if isinstance(self.right, Constant) else values[self.right.name]
         return bool(values[self.left.name] == right)
+
+
+@dataclass(frozen=True)
+class Ordered(Predicate):
+    """A term stands before or after another term or a value, in the values' own order."""
+
+    relation: Relation
+    left: Term | Constant
+    right: Term | Constant
+
+    def __str__(self) -> str:
+        return f"{self.left} {self.relation} {self.right}"
+
+    def terms(self) -> Iterator[Term]:
+        yield from (side for side in (self.left, self.right) if isinstance(side, Term))
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        return replace(self, left=_bound(self.left, binding), right=_bound(self.right, binding))
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        (left, rows), (right, cols) = _column(self.left, index), _column(self.right, index)
+        table = np.array([[self._compare(a, b) for b in right] for a in left], dtype=np.bool_)
+        mask: NDArray[np.bool_] = table[rows, cols]
+        return mask
+
+    def holds(self, values: Values) -> bool:
+        sides = (s.value if isinstance(s, Constant) else values[s.name] for s in (self.left, self.right))
+        return self._compare(*sides)
+
+    def _compare(self, left: Any, right: Any) -> bool:
+        return bool(_RELATIONS[self.relation](left, right))
+
+
+@dataclass(frozen=True)
+class Implies(Predicate):
+    """Where one predicate holds, another does."""
+
+    premise: Predicate
+    conclusion: Predicate
+
+    def __str__(self) -> str:
+        return f"({self.premise}) implies ({self.conclusion})"
+
+    def terms(self) -> Iterator[Term]:
+        yield from self.premise.terms()
+        yield from self.conclusion.terms()
+
+    def bind(self, binding: Mapping[str, Constant]) -> Predicate:
+        return Implies(self.premise.bind(binding), self.conclusion.bind(binding))
+
+    def mask(self, index: StateIndex) -> NDArray[np.bool_]:
+        return ~self.premise.mask(index) | self.conclusion.mask(index)
+
+    def holds(self, values: Values) -> bool:
+        return not self.premise.holds(values) or self.conclusion.holds(values)
 
 
 @dataclass(frozen=True)
@@ -322,6 +411,13 @@ ALWAYS: Predicate = AllOf(())
 
 def _parts(predicate: Predicate, kind: type[_Joined]) -> tuple[Predicate, ...]:
     return predicate.parts if isinstance(predicate, kind) else (predicate,)
+
+
+def _column(side: Term | Constant, index: StateIndex) -> tuple[tuple[Hashable, ...], NDArray[np.int64]]:
+    """Return the values that a side may take, and the place of each state's among them."""
+    if isinstance(side, Constant):
+        return (side.value,), np.zeros(index.size, dtype=np.int64)
+    return index.variable(side.name).values, index.column(side.name)
 
 
 def _bound(term: Term | Constant, binding: Mapping[str, Constant]) -> Term | Constant:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 
 from hierarchy import GroundGraph
 from planners.schedules import Exploration, LearningRate
-from worlds import Stream
+from worlds import Stream, TransitionModel
 
 
 class EpisodeTooLongError(RuntimeError):
@@ -76,14 +77,15 @@ class MaxQ:
         self.settings = settings or Settings()
         nodes = grounded.nodes
         self._primitives = len(grounded.model.actions)
-        self._successors: list[list[int]] = grounded.model.successors.tolist()
-        self._rewards: list[list[float]] = grounded.model.rewards.tolist()
+        self._outcomes = _outcomes(grounded.model)
         self._terminal: list[list[bool]] = [node.terminal.tolist() for node in nodes]
         self._children = [[call.child for call in node.calls] for node in nodes]
         self._available = [_choices(grounded, place) for place in range(len(nodes))]
         self._row: list[list[list[int]]] = [[c.projection.tolist() for c in node.calls] for node in nodes]
         self.completion: list[list[list[float]]] = [[[0.0] * c.rows for c in node.calls] for node in nodes]
-        self.reward = [0.0] * self._primitives
+        leaves = [node.leaf for node in nodes if node.leaf is not None]
+        self._leaf_row: list[list[int]] = [leaf.projection.tolist() for leaf in leaves]
+        self.reward: list[list[float]] = [[0.0] * leaf.rows for leaf in leaves]
         self.episodes = [0] * len(nodes)
         self.steps = 0
         self._limit = 0
@@ -92,7 +94,7 @@ class MaxQ:
     def value(self, task: int, state: int) -> float:
         """Return V(task, state): 0 where the task has ended, equation 2 elsewhere."""
         if task < self._primitives:
-            return self.reward[task]
+            return self.reward[task][self._leaf_row[task][state]]
         if self._terminal[task][state]:
             return 0.0
         return max(self.q(task, state, k) for k in self._available[task][state])
@@ -100,7 +102,10 @@ class MaxQ:
     def q(self, task: int, state: int, k: int) -> float:
         """Return Q(task, state, k-th child) = V(child, state) + C(task, state, child) (equation 3)."""
         child = self._children[task][k]
-        value = self.reward[child] if child < self._primitives else self.value(child, state)
+        if child < self._primitives:
+            value = self.reward[child][self._leaf_row[child][state]]
+        else:
+            value = self.value(child, state)
         return value + self.completion[task][k][self._row[task][k][state]]
 
     def c(self, task: int, state: int, k: int) -> float:
@@ -145,11 +150,13 @@ class MaxQ:
         A primitive action has no episodes of its own, and learns its reward at its caller's rate.
         """
         if task < self._primitives:
-            self.reward[task] += caller_rate * (self._rewards[state][task] - self.reward[task])
+            after, reward = self._act(task, state)
+            values, row = self.reward[task], self._leaf_row[task][state]
+            values[row] += caller_rate * (reward - values[row])
             self.steps += 1
             if self.steps > self._limit:
                 raise EpisodeTooLongError(f"no end after {self.settings.max_steps} primitive steps")
-            return 1, self._successors[state][task]
+            return 1, after
         rate = self.settings.rate(self.episodes[task])
         explore = self.settings.exploration(self.episodes[task])
         count = 0
@@ -163,6 +170,17 @@ class MaxQ:
             state = after
         self.episodes[task] += 1
         return count, state
+
+    def _act(self, action: int, state: int) -> tuple[int, float]:
+        """Return the next state and the reward of a primitive action; chance decides if it must."""
+        outcomes = self._outcomes[state][action]
+        if len(outcomes) == 1:
+            return outcomes[0][:2]
+        draw = self._random.uniform()
+        for after, reward, up_to in outcomes:
+            if draw < up_to:
+                return after, reward
+        return outcomes[-1][:2]
 
     def _explore(self, task: int, state: int, share: float) -> int:
         """Choose a child by the ordered GLIE policy."""
@@ -178,7 +196,7 @@ class MaxQ:
     def _follow(self, task: int, state: int, route: list[tuple[int, int]], limit: int) -> int | None:
         if task < self._primitives:
             route.append((state, task))
-            return self._successors[state][task] if len(route) <= limit else None
+            return self._act(task, state)[0] if len(route) <= limit else None
         while not self._terminal[task][state]:
             child = self._children[task][self.greedy(task, state)]
             after = self._follow(child, state, route, limit)
@@ -198,3 +216,18 @@ def _choices(grounded: GroundGraph, place: int) -> list[tuple[int, ...]]:
     calls = grounded.nodes[place].calls
     columns = [call.available.tolist() for call in calls]
     return [tuple(k for k, on in enumerate(row) if on) for row in zip(*columns, strict=True)]
+
+
+def _outcomes(model: TransitionModel) -> list[list[list[tuple[int, float, float]]]]:
+    """Return, by state and action, the outcomes that occur: next state, reward, cumulated probability."""
+    table = []
+    for after, rewards, chances in zip(
+        model.outcomes.tolist(), model.outcome_rewards.tolist(), model.probabilities.tolist(), strict=True
+    ):
+        row = []
+        for outcomes in zip(after, rewards, chances, strict=True):
+            occurring = [outcome for outcome in zip(*outcomes, strict=True) if outcome[2] > 0]
+            cumulated = accumulate(chance for _, _, chance in occurring)
+            row.append([(s, r, up_to) for (s, r, _), up_to in zip(occurring, cumulated, strict=True)])
+        table.append(row)
+    return table

@@ -15,7 +15,7 @@ from worlds.layout import (
 )
 from worlds.layout_text import layout_names, load_layout, parse_layout
 from worlds.maze import Change, Episode, MazeState, Outcome, Push, ahead, roll, step
-from worlds.model import TransitionModel, maze_model, maze_variables, state_number
+from worlds.model import StochasticModelError, TransitionModel, maze_model, maze_variables, state_number
 from worlds.randomness import Stream
 from worlds.variables import StateIndex, Variable
 
@@ -37,6 +37,7 @@ __all__ = [
     "Push",
     "Size",
     "StateIndex",
+    "StochasticModelError",
     "Stream",
     "TransitionModel",
     "UserError",

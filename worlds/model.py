@@ -1,8 +1,7 @@
-"""Exact transition models of finite, deterministic worlds."""
+"""Exact transition models of finite worlds, and the maze's."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -13,9 +12,12 @@ from worlds.maze import MazeState, step
 from worlds.variables import StateIndex, Variable
 
 
-@dataclass(frozen=True, eq=False)
+class StochasticModelError(ValueError):
+    """Something that needs a deterministic model was given one that is not."""
+
+
 class TransitionModel:
-    """What every action does in every state of a deterministic world.
+    """What every action does in every state of a finite world: outcomes with probabilities and rewards.
 
     Parameters
     ----------
@@ -24,34 +26,127 @@ class TransitionModel:
     actions
         Names of the primitive actions, in the order that breaks ties.
     successors
-        Number of the next state, shape (states, actions).
+        Numbers of the next states, shape (states, actions, outcomes), or (states, actions) for a
+        deterministic world.
     rewards
-        Reward of each action in each state, shape (states, actions).
+        Reward of each outcome, shaped like `successors`.
     starts
         The states in which an episode may begin, shape (states,), bool.
+    probabilities
+        Probability of each outcome, shaped like `successors`; the outcomes of an action sum to 1, and one
+        of probability 0 does not occur. Left out where there is one outcome.
+
+    Attributes
+    ----------
+    outcomes, outcome_rewards, probabilities
+        As above, always of shape (states, actions, outcomes).
+
+    Raises
+    ------
+    ValueError
+        If shapes do not fit, a successor is no state, or probabilities do not sum to 1.
+
+    Examples
+    --------
+    A slippery corridor: the step right fails in one of four cases.
+
+    >>> x = StateIndex((Variable("x", (0, 1, 2)),))
+    >>> successors = np.array([[[1, 0]], [[2, 1]], [[2, 2]]])
+    >>> chances = np.tile([0.75, 0.25], (3, 1, 1))
+    >>> rewards, starts = np.full((3, 1, 2), -1.0), np.ones(3, bool)
+    >>> model = TransitionModel(x, ("right",), successors, rewards, starts, probabilities=chances)
+    >>> model.is_deterministic, model.expectation(np.array([0.0, 0.0, 1.0]))[:, 0]
+    (False, array([0.  , 0.75, 1.  ]))
     """
 
-    index: StateIndex
-    actions: tuple[str, ...]
-    successors: NDArray[np.int64]
-    rewards: NDArray[np.float64]
-    starts: NDArray[np.bool_]
+    def __init__(
+        self,
+        index: StateIndex,
+        actions: tuple[str, ...],
+        successors: NDArray[np.int64],
+        rewards: NDArray[np.float64],
+        starts: NDArray[np.bool_],
+        *,
+        probabilities: NDArray[np.float64] | None = None,
+    ) -> None:
+        if successors.ndim == 2:
+            successors, rewards = successors[..., None], rewards[..., None]
+        if probabilities is None:
+            probabilities = np.ones(successors.shape)
+        elif probabilities.ndim == 2:
+            probabilities = probabilities[..., None]
+        self.index = index
+        self.actions = actions
+        self.outcomes = successors
+        self.outcome_rewards = rewards
+        self.probabilities = probabilities
+        self.starts = starts
+        self._check()
 
-    def __post_init__(self) -> None:
-        shape = (self.index.size, len(self.actions))
-        if self.successors.shape != shape or self.rewards.shape != shape:
-            raise ValueError(f"successors and rewards need shape (states, actions) = {shape}")
+    def _check(self) -> None:
+        shape = self.outcomes.shape
+        if shape[:2] != (self.index.size, len(self.actions)) or len(shape) != 3:
+            wanted = (self.index.size, len(self.actions))
+            raise ValueError(f"successors needs shape (states, actions[, outcomes]) = {wanted}, not {shape}")
+        if self.outcome_rewards.shape != shape or self.probabilities.shape != shape:
+            raise ValueError(f"rewards and probabilities need the shape of successors, {shape}")
         if self.starts.shape != shape[:1]:
-            raise ValueError(f"starts needs shape (states,) = {shape[:1]}")
-        if self.successors.min() < 0 or self.successors.max() >= self.index.size:
+            raise ValueError(f"starts needs shape (states,) = {shape[:1]}, not {self.starts.shape}")
+        if self.outcomes.min() < 0 or self.outcomes.max() >= self.index.size:
             raise ValueError(f"successors must be state numbers, 0 to {self.index.size - 1}")
+        if self.probabilities.min() < 0 or not np.allclose(self.probabilities.sum(axis=2), 1.0, atol=1e-9):
+            raise ValueError("the probabilities of an action's outcomes must be at least 0 and sum to 1")
+
+    @property
+    def is_deterministic(self) -> bool:
+        """Whether every action has one outcome in every state."""
+        return bool(self.outcomes.shape[2] == 1)
+
+    @property
+    def successors(self) -> NDArray[np.int64]:
+        """The next state of every action, shape (states, actions).
+
+        Raises
+        ------
+        StochasticModelError
+            If an action has several outcomes.
+        """
+        if not self.is_deterministic:
+            raise StochasticModelError("this needs a deterministic model; actions here have several outcomes")
+        return self.outcomes[..., 0]
+
+    @property
+    def rewards(self) -> NDArray[np.float64]:
+        """Expected reward of every action, shape (states, actions)."""
+        expected: NDArray[np.float64] = (self.probabilities * self.outcome_rewards).sum(axis=2)
+        return expected
+
+    def expectation(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the expected value of the next state, shape (states, actions), of values a state."""
+        expected: NDArray[np.float64] = (self.probabilities * values[self.outcomes]).sum(axis=2)
+        return expected
+
+    def may_reach(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return whether an action may lead into `mask`, shape (states, actions)."""
+        led: NDArray[np.bool_] = np.any((self.probabilities > 0) & mask[self.outcomes], axis=2)
+        return led
+
+    def must_reach(self, mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Return whether an action leads into `mask` whatever its outcome, shape (states, actions)."""
+        return ~self.may_reach(~mask)
+
+    def following(self, mask: NDArray[np.bool_], action: int) -> NDArray[np.int64]:
+        """Return the states that an action may lead to from the states of `mask`, sorted."""
+        occurs = self.probabilities[mask, action] > 0
+        return np.unique(self.outcomes[mask, action][occurs])
 
     def reachable(self, starts: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
-        """Return the states that some action sequence reaches from `starts`, shape (states,)."""
+        """Return the states that some action sequence may reach from `starts`, shape (states,)."""
         reach = np.array(self.starts if starts is None else starts)
+        occurs = self.probabilities > 0
         frontier = np.flatnonzero(reach)
         while frontier.size:
-            new = np.unique(self.successors[frontier])
+            new = np.unique(self.outcomes[frontier][occurs[frontier]])
             frontier = new[~reach[new]]
             reach[frontier] = True
         return reach

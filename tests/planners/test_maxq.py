@@ -49,7 +49,7 @@ def test_the_first_episode_by_hand() -> None:
     learner = MaxQ(grounded, seed=(0,), settings=HALF)
     assert learner.train(grounded.root, [0], episodes=1) == [2]
     # Step 1: V(right) = -1/2, then C(0) = (V(right) + C(1)) / 2 = (-1/2 + 0) / 2. Step 2: V(right) = -3/4.
-    assert learner.reward == [-0.75]
+    assert learner.reward == [[-0.75]]
     assert learner.completion[grounded.root] == [[-0.25, 0.0, 0.0]]
     assert learner.value(grounded.root, 0) == -1.0
 
@@ -59,7 +59,7 @@ def test_the_second_episode_by_hand() -> None:
     grounded = _one_task(3)
     learner = MaxQ(grounded, seed=(0,), settings=HALF)
     learner.train(grounded.root, [0], episodes=2)
-    assert learner.reward == [-0.9375]
+    assert learner.reward == [[-0.9375]]
     assert learner.completion[grounded.root] == [[-0.5625, 0.0, 0.0]]
 
 
@@ -68,7 +68,7 @@ def test_q_adds_the_completion_once() -> None:
     grounded = _two_levels()
     learner = MaxQ(grounded, seed=(0,))
     first, root = grounded.place("First"), grounded.root
-    learner.reward[0] = -1.0
+    learner.reward[0] = [-1.0]
     learner.completion[first][0][0] = -4.0
     learner.completion[root][0][0] = -16.0
     assert learner.q(first, 0, 0) == learner.value(first, 0) == -5.0

@@ -1,13 +1,28 @@
 from dataclasses import replace
+from typing import Any
 
 import networkx as nx
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 from strategies import ACTION_NUMBERS, maze_layouts
 
-from worlds import ACTIONS, Cell, Episode, Layout, MazeState, load_layout, maze_model, state_number
+from worlds import (
+    ACTIONS,
+    Cell,
+    Episode,
+    Layout,
+    MazeState,
+    StateIndex,
+    StochasticModelError,
+    TransitionModel,
+    Variable,
+    load_layout,
+    maze_model,
+    state_number,
+)
 
 
 def _graph(layout: Layout) -> nx.DiGraph:
@@ -94,11 +109,21 @@ def test_a_state_s_number_leaves_obstacles_out() -> None:
     assert state_number(layout, index, bare) == state_number(layout, index, crowded) == expected
 
 
+def _changed(model: TransitionModel, **changes: NDArray[Any]) -> TransitionModel:
+    """Return a deterministic model with some of its arrays replaced."""
+    arrays: dict[str, NDArray[Any]] = {
+        "successors": model.successors,
+        "rewards": model.rewards,
+        "starts": model.starts,
+    }
+    return TransitionModel(model.index, model.actions, **(arrays | changes))
+
+
 @pytest.mark.parametrize(
     ("field", "shape", "message"),
     [
-        ("successors", (2048, 3), "successors and rewards need shape"),
-        ("rewards", (2048, 3), "successors and rewards need shape"),
+        ("successors", (2048, 3), "successors needs shape"),
+        ("rewards", (2048, 3), "need the shape of successors"),
         ("starts", (2047,), r"starts needs shape \(states,\) = \(2048,\)"),
     ],
 )
@@ -106,7 +131,7 @@ def test_arrays_of_the_wrong_shape_are_refused(field: str, shape: tuple[int, ...
     """The error gives the shape wanted."""
     model = maze_model(load_layout("two_rooms"))
     with pytest.raises(ValueError, match=message):
-        replace(model, **{field: np.zeros(shape, dtype=getattr(model, field).dtype)})
+        _changed(model, **{field: np.zeros(shape, dtype=getattr(model, field).dtype)})
 
 
 @pytest.mark.parametrize("wrong", [-1, 2048])
@@ -116,4 +141,28 @@ def test_a_successor_that_is_no_state_is_refused(wrong: int) -> None:
     successors = model.successors.copy()
     successors[5, 2] = wrong
     with pytest.raises(ValueError, match="successors must be state numbers, 0 to 2047"):
-        replace(model, successors=successors)
+        _changed(model, successors=successors)
+
+
+def test_a_stochastic_model_by_hand() -> None:
+    """A coin that sticks or turns: expectations, what may and must follow, and what is refused."""
+    index = StateIndex((Variable("coin", ("heads", "tails")),))
+    successors = np.array([[[0, 1], [0, 0]], [[1, 0], [0, 0]]])
+    chances = np.array([[[0.5, 0.5], [1.0, 0.0]], [[0.9, 0.1], [1.0, 0.0]]])
+    rewards = np.array([[[0.0, 2.0], [1.0, 9.0]], [[0.0, 2.0], [1.0, 9.0]]])
+    heads = np.array([True, False])
+    model = TransitionModel(index, ("toss", "set"), successors, rewards, heads, probabilities=chances)
+    assert not model.is_deterministic
+    assert model.rewards.tolist() == [[1.0, 1.0], [0.2, 1.0]]
+    assert model.expectation(np.array([10.0, 0.0])).tolist() == [[5.0, 10.0], [1.0, 10.0]]
+    assert model.may_reach(~heads).tolist() == [[True, False], [True, False]]
+    assert model.must_reach(heads).tolist() == [[False, True], [False, True]]
+    assert model.following(heads, 0).tolist() == [0, 1]
+    assert model.reachable().all()
+    assert (
+        TransitionModel(index, ("set",), np.array([[0], [0]]), np.zeros((2, 1)), heads).reachable().sum() == 1
+    )
+    with pytest.raises(StochasticModelError, match="several outcomes"):
+        _ = model.successors
+    with pytest.raises(ValueError, match="sum to 1"):
+        TransitionModel(index, ("toss", "set"), successors, rewards, heads, probabilities=chances / 2)
