@@ -68,7 +68,7 @@ class Encounter:
 
 @dataclass(frozen=True)
 class Moment:
-    """The robot about to act: for watching an episode as it goes."""
+    """The robot about to act, and what it saw in the direction of its action."""
 
     step: int
     task: int
@@ -165,9 +165,8 @@ class Robot:
         """Choose the next action, looking in its direction first; None if no way is left."""
         if task is None or not self._runs(task, belief.state):
             task = self.strategy.choose(belief.state)
-        looked: set[int] = set()
+        looked: dict[int, Detection] = {}
         met: list[Encounter] = []
-        detection: Detection | None = None
         insisted: int | None = None
         while task is not None:
             route = self.strategy.route(task, belief.state)
@@ -178,11 +177,9 @@ class Robot:
                 continue
             action = route[0] if insisted is None else insisted
             if action in looked:
-                assert detection is not None, "every direction is looked in before it is taken"
-                return Moment(episode.steps, task, action, detection, tuple(met))
-            looked.add(action)
-            detection = self._look(episode, action, run)
-            cell = belief.see(action, detection)
+                return Moment(episode.steps, task, action, looked[action], tuple(met))
+            looked[action] = self._look(episode, action, run)
+            cell = belief.see(action, looked[action])
             encounter = None if cell is None else self._meet(episode, belief, task, cell, run)
             if encounter is not None:
                 met.append(encounter)
