@@ -66,6 +66,46 @@ def doctor() -> int:
     return 0 if all(check.well for check in checks) else 1
 
 
+@app.command
+def check(graph: str, /, *, world: str | None = None) -> int:
+    """Check a task graph: print it, what is wrong with it, what it stores, and what is proved safe.
+
+    Exit status 0 says that it may run, 1 that there are findings, 2 that it cannot be read.
+
+    Parameters
+    ----------
+    graph
+        A YAML file, or the name of a graph that comes with the package (two_rooms).
+    world
+        World to check it on: a name or a .maze file. Defaults to the one that the graph names.
+    """
+    from comparisons.graph_commands import check_graph
+
+    verdict = check_graph(graph, world)
+    print(verdict.text)
+    return 0 if verdict.well else 1
+
+
+@app.command
+def draw(graph: str, /, *, world: str | None = None, out: Path = Path()) -> int:
+    """Draw a task graph: Mermaid (.mmd) and Graphviz (.dot) text, and a picture (.png, .svg).
+
+    Parameters
+    ----------
+    graph
+        A YAML file, or the name of a graph that comes with the package (two_rooms).
+    world
+        World that it is for: a name or a .maze file. Defaults to the one that the graph names.
+    out
+        Folder of the files. None of them may exist.
+    """
+    from comparisons.graph_drawing import draw_graph
+
+    for path in draw_graph(graph, world, out):
+        print(path)
+    return 0
+
+
 def main(tokens: Sequence[str] | None = None) -> None:
     """Run the command line; a user's mistake is one message and exit status 2, never a traceback."""
     try:

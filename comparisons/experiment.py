@@ -65,7 +65,7 @@ class Spec:
     @property
     def episodes(self) -> int:
         """Random episodes of the dynamic part."""
-        return 40 if self.quick else 500
+        return 30 if self.quick else 500
 
 
 @dataclass(frozen=True, eq=False)

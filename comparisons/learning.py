@@ -10,7 +10,9 @@ from planners import MaxQ, flat_field, task_field
 from worlds import Cell, Layout
 
 EPISODES: Final = 1200
-"""Episodes of each phase of learning, as in figure 12."""
+"""Episodes of each phase of a subtask's learning, as in figure 12."""
+ROOT_EPISODES: Final = 400
+"""Episodes of the root: it has two doors to choose between, and its subtasks are learnt by then."""
 
 Table = list[list[int | None]]
 """Steps to a subgoal, row by row of a room; None where the greedy policy does not arrive."""
@@ -83,7 +85,7 @@ class PairLearner:
         }
         for task in self.subtasks():
             self.learner.train(self.grounded.place(task), self._starts(task), EPISODES)
-        self.learner.train(self.grounded.root, self._starts(to_trigger), EPISODES)
+        self.learner.train(self.grounded.root, self._starts(to_trigger), ROOT_EPISODES)
         return curves if measure else {}
 
     def step_table(self, task: str) -> Table:

@@ -168,6 +168,8 @@ def _bound_term(graph: TaskGraph, task: Task, where: str, param: Param, term: Te
     elif isinstance(term, Param) and term not in task.params:
         mend = _suggest(term.name, [own.name for own in task.params], "parameters")
         yield Finding("unknown parameter", where, f"{term.name!r} is no parameter of {task.name}", mend)
+    elif isinstance(term, Var) and set(term.domain.values) & set(param.domain.values):
+        return  # the child is called where the variable has a value that the parameter can take
     elif not set(term.domain.values) <= set(param.domain.values):
         yield Finding(
             "mistyped parameter",

@@ -1,4 +1,4 @@
-"""Drawing a task graph: Mermaid text, and a networkx graph ready for a picture."""
+"""Drawing a task graph: Mermaid and Graphviz text, and a networkx graph ready for a picture."""
 
 from __future__ import annotations
 
@@ -37,6 +37,44 @@ def mermaid(graph: TaskGraph) -> str:
             arrow = f'-- "{label}" -->' if label else "-->"
             lines.append(f"    {task.name} {arrow} {call.child}")
     return "\n".join(lines) + "\n"
+
+
+def dot(graph: TaskGraph) -> str:
+    r"""Return the task graph in Graphviz's language; edges carry bindings and guards.
+
+    Examples
+    --------
+    >>> from hierarchy import two_rooms
+    >>> from worlds import load_layout
+    >>> print(*dot(two_rooms(load_layout("two_rooms"))).splitlines()[:5], sep="\n")
+    digraph "two_rooms" {
+        node [fontname="Helvetica"]
+        edge [fontname="Helvetica", fontsize=10]
+        "Root" [label="Root", shape=box, style="rounded,bold"]
+        "GotoTrigger" [label="GotoTrigger(target)", shape=box, style="rounded"]
+    """
+    lines = [f"digraph {_quoted(graph.name)} {{"]
+    lines += ['    node [fontname="Helvetica"]', '    edge [fontname="Helvetica", fontsize=10]']
+    tasks = sorted(graph.tasks.values(), key=lambda task: task.name != graph.root.name)
+    for task in tasks:
+        params = ", ".join(param.name for param in task.params)
+        label = f"{task.name}({params})" if params else task.name
+        style = "rounded,bold" if task.name == graph.root.name else "rounded"
+        lines.append(f'    {_quoted(task.name)} [label={_quoted(label)}, shape=box, style="{style}"]')
+    lines += [f"    {_quoted(action)} [shape=hexagon]" for action in graph.actions]
+    for task in tasks:
+        for call in task.do:
+            bound = ", ".join(f"{name}={value}" for name, value in call.binding)
+            guard = "" if call.guard == ALWAYS else f"when {call.guard}"
+            label = "\n".join(part for part in (bound, guard) if part)
+            note = f" [label={_quoted(label)}]" if label else ""
+            lines.append(f"    {_quoted(task.name)} -> {_quoted(call.child)}{note}")
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def _quoted(text: str) -> str:
+    r"""Return a text as a quoted identifier of Graphviz, in which a line break is written \n."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
 
 
 def task_graph_picture(graph: TaskGraph) -> nx.DiGraph[str]:

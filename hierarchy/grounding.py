@@ -156,8 +156,9 @@ class GroundGraph:
 def ground(graph: TaskGraph, model: TransitionModel) -> GroundGraph:
     """Bind every parameter in every way the graph calls for, and compile predicates to masks.
 
-    A child bound to a state variable becomes one call for each value, guarded by that value. The graph
-    must have passed `hierarchy.check`.
+    A child bound to a state variable becomes one call for each value that its parameter can take, guarded
+    by that value; with another value of the variable it cannot be called. The graph must have passed
+    `hierarchy.check`.
 
     Examples
     --------
@@ -229,11 +230,13 @@ class _Builder:
         index = self.model.index
         options: list[list[tuple[Constant, Mask]]] = []
         everywhere = ALWAYS.mask(index)
-        for _, bound in call.binding:
+        params = {param.name: param for param in self.graph.tasks[call.child].params} if call.binding else {}
+        for name, bound in call.binding:
             if isinstance(bound, Constant):
                 options.append([(bound, everywhere)])
             elif isinstance(bound, Var):
-                constants = [bound.constant(value) for value in bound.domain.values]
+                shared = (value for value in bound.domain.values if value in params[name].domain)
+                constants = [bound.constant(value) for value in shared]
                 options.append([(c, Equal(bound, c).mask(index)) for c in constants])
             else:
                 options.append([(values[bound.name], everywhere)])

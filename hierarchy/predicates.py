@@ -367,7 +367,7 @@ class _Joined(Predicate):
         return replace(self, parts=tuple(part.bind(binding) for part in self.parts))
 
     def _write(self, word: str, empty: str) -> str:
-        texts = [f"({p})" if isinstance(p, _Joined) and p.parts else str(p) for p in self.parts]
+        texts = [f"({p})" if _is_compound(p) else str(p) for p in self.parts]
         return f" {word} ".join(texts) if texts else empty
 
 
@@ -407,6 +407,11 @@ class AnyOf(_Joined):
 
 ALWAYS: Predicate = AllOf(())
 """The predicate that holds everywhere."""
+
+
+def _is_compound(predicate: Predicate) -> bool:
+    """Return whether a predicate needs parentheses inside another."""
+    return isinstance(predicate, Implies) or (isinstance(predicate, _Joined) and bool(predicate.parts))
 
 
 def _parts(predicate: Predicate, kind: type[_Joined]) -> tuple[Predicate, ...]:

@@ -1,8 +1,12 @@
-"""How a learner's rate and exploration fall with the number of episodes."""
+"""How a learner's rate falls with the number of episodes."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+
+Rate = Callable[[int], float]
+"""The rate in an episode, counted from 0."""
 
 
 @dataclass(frozen=True)
@@ -30,25 +34,25 @@ class LearningRate:
 
 
 @dataclass(frozen=True)
-class Exploration:
-    """A greedy-in-the-limit share of random choices: half / (half + n) in episode n.
+class HarmonicRate:
+    """A rate that falls as half / (half + n), for worlds with chance.
 
-    The shares sum to infinity and fall to zero, so every child is tried infinitely often and the policy
-    becomes greedy: GLIE (Singh et al., 2000). After `half` episodes every second choice is random.
+    The rates' sum is infinite and that of their squares finite, which convergence on a stochastic world
+    asks for (Dietterich 2000, theorem 3); a geometric rate comes to rest a little beside the limit.
 
     Examples
     --------
-    >>> explore = Exploration(half=100)
-    >>> explore(0), explore(100), explore(300)
+    >>> rate = HarmonicRate(half=100)
+    >>> rate(0), rate(100), rate(300)
     (1.0, 0.5, 0.25)
     """
 
-    half: int = 150
+    half: int = 100
 
     def __post_init__(self) -> None:
         if self.half <= 0:
-            raise ValueError(f"exploration needs half > 0, not {self.half}")
+            raise ValueError(f"harmonic rate needs half > 0, not {self.half}")
 
     def __call__(self, episode: int) -> float:
-        """Return the share of random choices in the given episode, counted from 0."""
+        """Return the rate in the given episode, counted from 0."""
         return self.half / (self.half + episode)

@@ -1,6 +1,7 @@
 """What a robot lives in: state variables, mazes, exact transition models, environments, the PyBullet twin."""
 
 from worlds.errors import LayoutError, UserError
+from worlds.finite import WorldError, finite_world
 from worlds.layout import (
     ACTIONS,
     DELTAS,
@@ -42,7 +43,9 @@ __all__ = [
     "TransitionModel",
     "UserError",
     "Variable",
+    "WorldError",
     "ahead",
+    "finite_world",
     "layout_names",
     "load_layout",
     "maze_model",

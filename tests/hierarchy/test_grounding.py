@@ -2,7 +2,7 @@ import networkx as nx
 import numpy as np
 import pytest
 
-from hierarchy import GroundGraph, Param, TaskGraph, ground, two_rooms
+from hierarchy import GroundGraph, Param, TaskGraph, check, ground, two_rooms
 from worlds import ACTIONS, Cell, StateIndex, TransitionModel, Variable, load_layout, maze_model
 
 MAZE = load_layout("two_rooms")
@@ -140,3 +140,23 @@ def test_the_root_s_edges_store_by_their_own_variables(paper: GroundGraph) -> No
         "GotoGoal": ((), 1),
     }
     assert {c.relevant for c in paper.node("GotoGoal(G2)").calls} == {("robot",)}
+
+
+def test_a_variable_with_more_values_than_the_parameter_binds_those_they_share() -> None:
+    """Where the variable has another value, the child cannot be called."""
+    index = StateIndex((Variable("x", (0, 1, 2)), Variable("wish", (0, 2, "none"))))
+    cells, wishes = index.column("x"), index.column("wish")
+    step = [np.clip(cells + by, 0, 2) * 3 + wishes for by in (-1, 1)]
+    successors = np.stack(step, axis=1)
+    model = TransitionModel(
+        index, ("left", "right"), successors, np.full((9, 2), -1.0), (cells == 1) & (wishes < 2)
+    )
+    graph = TaskGraph("wishes", index.variables, model.actions)
+    x, wish = graph.variables
+    to = Param.over("to", {"low": 0, "high": 2})
+    go = graph.task("Go", to, until=x.eq(to), uses=[x], do="left right")
+    graph.task("Root", until=x.eq(wish), uses=[x, wish], do=[go(to=wish)])
+    assert check(graph, model) == ()
+    root = ground(graph, model).nodes[-1]
+    called = [(call.child, np.flatnonzero(call.available).tolist()) for call in root.calls]
+    assert called == [(2, [3, 6]), (3, [1, 4])]

@@ -1,0 +1,117 @@
+"""`affordant check`: a task graph in words, what is wrong with it, what it stores, and what is proved."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from hierarchy import ALWAYS, Call, GroundGraph, Task, TaskGraph, check, ground, value_counts
+from hierarchy.abstraction import prove_abstraction
+from hierarchy.text import load_graph, load_world
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What `affordant check` prints, and whether the graph may run."""
+
+    text: str
+    well: bool
+
+
+def check_graph(name: str, world: str | None = None) -> Verdict:
+    r"""Describe a task graph, check it on its world, and count its values.
+
+    Parameters
+    ----------
+    name
+        A graph's name or the path of its text.
+    world
+        The world's name. Defaults to the one that the text names.
+
+    Raises
+    ------
+    UserError
+        If the graph or the world cannot be read.
+
+    Examples
+    --------
+    >>> verdict = check_graph("two_rooms")
+    >>> print(verdict.text.splitlines()[0])
+    task graph two_rooms on world two_rooms: 4 tasks, 4 primitive actions, 2048 states
+    >>> verdict.well
+    True
+    """
+    graph, used = load_graph(name, None if world is None else load_world(world))
+    model = used.model()
+    lines = [
+        f"task graph {graph.name} on world {used.name}: {len(graph.tasks)} tasks, "
+        f"{len(graph.actions)} primitive actions, {model.index.size} states",
+        *describe(graph),
+    ]
+    findings = check(graph, model)
+    if findings:
+        lines += ["", f"findings: {len(findings)}", *(f"  {finding}" for finding in findings)]
+    else:
+        grounded = ground(graph, model)
+        lines += ["", "findings: none", "", *_counted(grounded)]
+        lines += [
+            "",
+            "state abstraction:",
+            *(f"  {line}" for line in str(prove_abstraction(grounded)).splitlines()),
+        ]
+    return Verdict("\n".join(lines), not findings)
+
+
+def describe(graph: TaskGraph) -> Iterator[str]:
+    r"""Yield a task graph line by line, root first: tasks, parameters, terminations, children with guards.
+
+    Examples
+    --------
+    >>> from hierarchy import two_rooms
+    >>> from worlds import load_layout
+    >>> print(*list(describe(two_rooms(load_layout("two_rooms"))))[2:6], sep="\n")
+      until  doors = open and robot = goal
+      uses   robot, trigger, goal, doors
+      do     GotoTrigger(target=trigger) when doors = closed, uses trigger, goal
+             GotoDoor(target=D1) when doors = open and robot in room A, uses goal
+    """
+    for task in sorted(graph.tasks.values(), key=lambda task: task.name != graph.root.name):
+        yield ""
+        yield task.name + (", the root" if task.name == graph.root.name else "")
+        for key, lines in _parts(task):
+            for place, line in enumerate(lines):
+                yield f"  {'' if place else key:6} {line}"
+
+
+def _parts(task: Task) -> Iterator[tuple[str, list[str]]]:
+    if task.params:
+        yield "params", [f"{param} in {{{', '.join(param.domain.labels)}}}" for param in task.params]
+    yield "until", [str(task.until)]
+    optional = {"goal": task.goal, "within": task.within, "start": task.start}
+    yield from ((key, [str(predicate)]) for key, predicate in optional.items() if predicate != ALWAYS)
+    if task.pseudo_reward is not None:
+        yield "else", [f"pseudo-reward {task.pseudo_reward:g}"]
+    yield "uses", [", ".join(task.uses) or "nothing"]
+    if all(call == Call(call.child) for call in task.do):
+        yield "do", [", ".join(call.child for call in task.do)]
+    else:
+        yield "do", [_edge(call) for call in task.do]
+
+
+def _edge(call: Call) -> str:
+    guard = "" if call.guard == ALWAYS else f" when {call.guard}"
+    own = "" if call.relevant is None else f", uses {', '.join(call.relevant) or 'nothing'}"
+    return f"{call}{guard}{own}"
+
+
+def _counted(grounded: GroundGraph) -> Iterator[str]:
+    counts = value_counts(grounded)
+    rows = [(f"completions of {task}", count) for task, count in counts.per_task.items()]
+    rows += [
+        (f"completions of {grounded.graph.root.name}", counts.root),
+        ("primitive actions", counts.leaves),
+    ]
+    rows += [("all of these", counts.abstracted + counts.root), ("flat Q", counts.flat_markov)]
+    yield "values stored:"
+    width = max(len(what) for what, _ in rows)
+    yield from (f"  {what:{width}}  {count:>7}" for what, count in rows)

@@ -1,0 +1,159 @@
+"""YAML as plain data with the line of every key, and mistakes told by line and path."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import yaml
+
+from hierarchy.graph import TaskGraphError
+
+Path = tuple[str | int, ...]
+"""Keys and places in lists that lead to a part of a document."""
+LARGEST: Final = 1_000_000
+"""Characters that a document may have."""
+_DEEPEST: Final = 20  # the format itself needs 7
+
+
+@dataclass(frozen=True, order=True)
+class Fault:
+    """One mistake in a text: its line, counted from 1, the path of its key, what is wrong, and a mend."""
+
+    line: int
+    path: str
+    problem: str
+    mend: str
+
+    def __str__(self) -> str:
+        at = f"line {self.line}, {self.path}" if self.path else f"line {self.line}"
+        return f"{at}: {self.problem}; {self.mend}"
+
+
+class TaskGraphTextError(TaskGraphError):
+    """The text of a task graph is wrong; `faults` tells where, in the order of their lines.
+
+    Examples
+    --------
+    >>> fault = Fault(3, "tasks.Root.untl", "unknown key 'untl'", "did you mean 'until'?")
+    >>> str(TaskGraphTextError("mine.yaml", [fault]))
+    "mine.yaml, line 3, tasks.Root.untl: unknown key 'untl'; did you mean 'until'?"
+    """
+
+    def __init__(self, source: str, faults: Iterable[Fault]) -> None:
+        self.source = source
+        self.faults = tuple(sorted(faults))
+        super().__init__("\n".join(f"{source}, {fault}" for fault in self.faults))
+
+
+@dataclass(frozen=True)
+class Document:
+    """A document's data, every scalar as it is written, and the line of each of its parts."""
+
+    data: Any
+    lines: Mapping[Path, int] = field(repr=False)
+
+    def fault(self, path: Path, problem: str, mend: str) -> Fault:
+        """Return a fault of the part at `path`, or of the nearest part above it that is there."""
+        known = path
+        while known not in self.lines:
+            known = known[:-1]
+        return Fault(self.lines[known], path_text(path), problem, mend)
+
+
+def path_text(path: Path) -> str:
+    """Return a path as people write it.
+
+    >>> path_text(("tasks", "Root", "do", 1, "when"))
+    'tasks.Root.do[1].when'
+    """
+    words = [f"[{part}]" if isinstance(part, int) else f".{part}" for part in path]
+    return "".join(words).removeprefix(".")
+
+
+def read_yaml(text: str, source: str) -> Document:
+    r"""Read one YAML document of mappings, lists and scalars; JSON will do, too.
+
+    Scalars are taken as written, so that the labels ``no``, ``1e3`` and ``5:30`` mean themselves. Tags,
+    anchors and aliases are refused: nothing here needs them, and they can make a small file huge.
+
+    Raises
+    ------
+    TaskGraphTextError
+        If it is no such document, holds a key twice, or is too large.
+
+    Examples
+    --------
+    >>> document = read_yaml("graph: no\ntasks:\n  Root: {uses: [x]}\n", "mine.yaml")
+    >>> document.data, document.lines["tasks", "Root"]
+    ({'graph': 'no', 'tasks': {'Root': {'uses': ['x']}}}, 3)
+    """
+    try:
+        if len(text) > LARGEST:
+            problem = f"the text has {len(text)} characters, more than {LARGEST}"
+            raise _refused(source, 1, problem, "split the task graph")
+        _refuse_specials(text, source)
+        node = yaml.compose(text, Loader=yaml.SafeLoader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = mark.line + 1 if mark else 1
+        column = f" at column {mark.column + 1}" if mark else ""
+        raise _refused(source, line, f"this is no YAML{column}: {error.problem}", "mend it there") from None
+    except yaml.YAMLError as error:
+        raise _refused(source, 1, f"this is no YAML: {error}", "remove such characters") from None
+    if node is None:
+        raise _refused(source, 1, "the text is empty", "begin it with 'graph: NAME'")
+    reader = _Reader(source)
+    data = reader.read(node, ())
+    if reader.faults:
+        raise TaskGraphTextError(source, reader.faults)
+    return Document(data, reader.lines)
+
+
+def _refuse_specials(text: str, source: str) -> None:
+    depth = 0
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        line = event.start_mark.line + 1
+        if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None):
+            raise _refused(source, line, "anchors (&) and aliases (*) are not read here", "write it out")
+        if getattr(event, "tag", None):
+            raise _refused(source, line, f"the tag {event.tag} is not read here", "remove it")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise _refused(source, line, f"it is nested more than {_DEEPEST} deep", "write it flatter")
+
+
+def _refused(source: str, line: int, problem: str, mend: str) -> TaskGraphTextError:
+    return TaskGraphTextError(source, [Fault(line, "", problem, mend)])
+
+
+class _Reader:
+    """Turns nodes into data, keeping lines."""
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+        self.lines: dict[Path, int] = {}
+        self.faults: list[Fault] = []
+
+    def read(self, node: yaml.Node, path: Path) -> Any:
+        self.lines.setdefault(path, node.start_mark.line + 1)
+        if isinstance(node, yaml.ScalarNode):
+            return node.value
+        if isinstance(node, yaml.SequenceNode):
+            return [self.read(item, (*path, place)) for place, item in enumerate(node.value)]
+        data: dict[str, Any] = {}
+        for key, value in node.value:
+            line = key.start_mark.line + 1
+            if not isinstance(key, yaml.ScalarNode):
+                self.faults.append(Fault(line, path_text(path), "a key is no word", "write a plain key"))
+                continue
+            here = (*path, key.value)
+            if key.value in data:
+                first = self.lines[here]
+                problem = f"the key {key.value!r} is given again; it stands in line {first} already"
+                self.faults.append(Fault(line, path_text(here), problem, "remove one of the two"))
+                continue
+            self.lines[here] = line
+            data[key.value] = self.read(value, here)
+        return data

@@ -1,0 +1,125 @@
+"""The words of predicates in a task graph's text: tokens, quotes, literals, and what is said of mistakes."""
+
+from __future__ import annotations
+
+import json
+import re
+from ast import literal_eval
+from collections.abc import Callable, Hashable, Iterable, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from typing import Final, cast
+
+from hierarchy.graph import TaskGraphError
+from hierarchy.predicates import Term, ValueSet
+
+_TOKEN: Final = re.compile(
+    r"""(?P<value>"(?:[^"\\]|\\.)*")|(?P<name>`(?:[^`]|``)*`)|(?P<sign><=|>=|!=|[=<>(){}])"""
+    r"""|(?P<word>[^\s(){}"`=<>!]+)|(?P<wrong>\S)""",
+    re.DOTALL,
+)
+KEYWORDS: Final = frozenset({"and", "or", "not", "in", "implies", "always", "never"})
+
+
+class PredicateError(TaskGraphError):
+    """A predicate's text is wrong; `column` counts from 1 in `text`."""
+
+    def __init__(self, text: str, column: int, problem: str, mend: str) -> None:
+        self.problem = f"column {column} of {' '.join(text.split())!r}: {problem}"
+        self.mend = mend
+        self.column = column
+        super().__init__(f"{self.problem}; {mend}")
+
+
+@dataclass(frozen=True)
+class Scope:
+    """What the words of a predicate may mean: terms and sets of values, by name."""
+
+    terms: Mapping[str, Term]
+    sets: Mapping[str, ValueSet] = field(default_factory=dict)
+
+
+def suggestion(name: str, known: Iterable[str], what: str) -> str:
+    """Return a mend for an unknown name: the nearest that is known, or all of them.
+
+    >>> suggestion("dors", ["robot", "doors"], "state variables")
+    "did you mean 'doors'?"
+    """
+    names = list(dict.fromkeys(known))
+    near = get_close_matches(name, names, n=1)
+    most = 12  # a maze has many cells
+    listed = ", ".join(names[:most]) + (", ..." if len(names) > most else "")
+    return f"did you mean {near[0]!r}?" if near else f"{what}: {listed or 'none'}"
+
+
+@dataclass(frozen=True)
+class Token:
+    """A piece of a text, and the column that it begins at, counted from 1.
+
+    Kinds: value, name, sign, word and end; a parser adds phrase, several words.
+    """
+
+    kind: str
+    text: str
+    column: int
+
+
+def tokens(text: str) -> list[Token]:
+    """Split a text; a comma at a word's end becomes a sign."""
+    tokens = []
+    for match in _TOKEN.finditer(text):
+        kind, word, column = str(match.lastgroup), match[0], match.start() + 1
+        if kind == "wrong":
+            mend = "close the quotes" if word in '"`' else "write 'not' or '!='"
+            raise PredicateError(text, column, f"{word!r} stands alone", mend)
+        if kind == "word" and word.endswith(","):
+            bare = word.rstrip(",")
+            tokens += [Token("word", bare, column)] if bare else []
+            tokens += [Token("sign", ",", column + len(bare) + i) for i in range(len(word) - len(bare))]
+        else:
+            tokens.append(Token(kind, word, column))
+    return [*tokens, Token("end", "the end", len(text) + 1)]
+
+
+def literal(text: str) -> Hashable:
+    """Return the Python number, truth value, tuple or quoted string that a text writes; else the text.
+
+    >>> literal("3"), literal("(1, 2)"), literal("near"), literal("'3'")
+    (3, (1, 2), 'near', '3')
+    """
+    try:
+        value = literal_eval(text.strip())
+        hash(value)
+    except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
+        return text
+    return cast("Hashable", value)
+
+
+def bare_or(text: str, quoted: Callable[[str], str]) -> str:
+    """Return a text as it is if it is read as itself, in quotes otherwise.
+
+    >>> bare_or("room A", name_in_quotes), bare_or("not here", name_in_quotes), bare_or("a,", value_in_quotes)
+    ('room A', '`not here`', '"a,"')
+    """
+    words = text.split(" ")
+    matches = [_TOKEN.fullmatch(word) for word in words]
+    plain = all(match and match.lastgroup == "word" and not match[0].endswith(",") for match in matches)
+    return text if plain and not KEYWORDS & set(words) else quoted(text)
+
+
+def name_in_quotes(name: str) -> str:
+    """Return a name in back quotes.
+
+    >>> name_in_quotes("on(a,b)")
+    '`on(a,b)`'
+    """
+    return "`" + name.replace("`", "``") + "`"
+
+
+def value_in_quotes(label: str) -> str:
+    r"""Return a value in quotes, with JSON's escapes.
+
+    >>> print(value_in_quotes('6" nail'))
+    "6\" nail"
+    """
+    return json.dumps(label, ensure_ascii=False)

@@ -1,0 +1,141 @@
+"""`affordant check` and `affordant draw`: what they print and write, and their exit status."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from comparisons.cli import main
+from comparisons.graph_drawing import draw_graph
+from hierarchy import mermaid
+from hierarchy.drawing import dot
+from hierarchy.text import load_graph
+from worlds import UserError
+
+WRONG = """\
+graph: wrong
+world: two_rooms
+tasks:
+  Root:
+    until: robot = goal
+    uses: [robot]
+    do: [North, South, West, East]
+"""
+
+
+def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
+    """Run a command; return its exit status and what it printed."""
+    with pytest.raises(SystemExit) as ended:
+        main(tokens)
+    out, err = capsys.readouterr()
+    assert isinstance(ended.value.code, int)
+    return ended.value.code, out, err
+
+
+def test_check_tells_a_graph_and_its_counts(capsys: pytest.CaptureFixture[str]) -> None:
+    """Tasks with parameters, terminations and guarded children; the paper's counts; the proof; status 0."""
+    status, out, err = run(capsys, "check", "two_rooms")
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert lines[0] == "task graph two_rooms on world two_rooms: 4 tasks, 4 primitive actions, 2048 states"
+    assert "  until  doors = open and robot = goal" in lines
+    assert "  params target in {D1, D2}" in lines
+    assert "         GotoDoor(target=D2) when doors = open and robot in room A, uses goal" in lines
+    assert "findings: none" in lines
+    counts = [line.split() for line in lines[lines.index("values stored:") + 1 :]]
+    assert ["completions", "of", "GotoTrigger", "512"] in counts
+    assert ["primitive", "actions", "4"] in counts
+    assert ["flat", "Q", "8192"] in counts
+    proved, _, of, *rest = lines[lines.index("state abstraction:") + 1].split()
+    assert proved == of
+    assert rest[:3] == ["tables", "proved", "safe"]
+
+
+def test_check_tells_findings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A graph that cannot run is printed all the same; status 1."""
+    (tmp_path / "wrong.yaml").write_text(WRONG)
+    status, out, _ = run(capsys, "check", str(tmp_path / "wrong.yaml"))
+    assert status == 1
+    assert "findings: 1\n  Root: until (robot = goal) reads 'goal'" in out
+    assert "values stored" not in out
+
+
+def test_check_tells_what_a_task_may_say(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Goal, initiation and pseudo-reward appear where there are any."""
+    more = "    goal: doors = open\n    start: doors = closed\n    pseudo_reward: -2.5\n    uses: [robot]"
+    (tmp_path / "more.yaml").write_text(WRONG.replace("    uses: [robot]", more))
+    _, out, _ = run(capsys, "check", str(tmp_path / "more.yaml"), "--world", "two_rooms")
+    for line in ("  goal   doors = open", "  start  doors = closed", "  else   pseudo-reward -2.5"):
+        assert line in out.splitlines()
+
+
+@pytest.mark.parametrize(
+    ("tokens", "expected"),
+    [
+        (("check", "two_room"), "no task graph of this name and no such file; did you mean 'two_rooms'?"),
+        (("check", "two_rooms", "--world", "txi"), "no world 'txi'; did you mean 'taxi'?"),
+        (
+            ("check", "two_rooms", "--world", "taxi"),
+            "tasks.GotoTrigger.params.target.of: unknown state variable",
+        ),
+        (
+            ("check", "text.yaml"),
+            "text.yaml, line 5, tasks.Root.until: column 9 of 'robot = gaol': unknown value",
+        ),
+        (("draw", "text.yaml"), "did you mean 'goal'?"),
+        (("draw", "ring.yaml"), "tasks call each other in a ring, Root -> Root; remove one of its edges"),
+        (("draw", "two_rooms", "--out", "text.yaml"), "--out text.yaml: the drawings cannot be written"),
+    ],
+)
+def test_a_users_mistake_is_one_message(
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    tokens: tuple[str, ...],
+    expected: str,
+) -> None:
+    """Status 2, no output and no file."""
+    monkeypatch.chdir(tmp_path)
+    Path("text.yaml").write_text(WRONG.replace("= goal", "= gaol"))
+    Path("ring.yaml").write_text(WRONG.replace("East]", "Root]"))
+    status, out, err = run(capsys, *tokens)
+    assert (status, out) == (2, "")
+    assert err.startswith("affordant: ")
+    assert expected in err
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["ring.yaml", "text.yaml"]
+
+
+def test_draw_writes_four_files_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """Mermaid, Graphviz and two pictures; a second time nothing is replaced or added."""
+    out_dir = tmp_path / "new" / "folder"
+    status, out, _ = run(capsys, "draw", "two_rooms", "--out", str(out_dir))
+    names = [f"two_rooms.{kind}" for kind in ("mmd", "dot", "png", "svg")]
+    assert status == 0
+    assert [Path(line).name for line in out.splitlines()] == names
+    graph = load_graph("two_rooms").graph
+    assert (out_dir / "two_rooms.mmd").read_text(encoding="utf-8") == mermaid(graph)
+    assert (out_dir / "two_rooms.dot").read_text(encoding="utf-8") == dot(graph)
+    assert (out_dir / "two_rooms.png").read_bytes()[1:4] == b"PNG"
+    assert "GotoGoal" not in names
+    assert (out_dir / "two_rooms.svg").read_text(encoding="utf-8").startswith("<?xml")
+    for name in names[1:]:
+        (out_dir / name).unlink()
+    status, out, err = run(capsys, "draw", "two_rooms", "--out", str(out_dir))
+    assert (status, out) == (2, "")
+    assert "two_rooms.mmd: it exists already; name another folder" in err
+    assert [path.name for path in out_dir.iterdir()] == ["two_rooms.mmd"]
+
+
+def test_drawings_appear_all_or_none(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A disk that fails at the third file leaves none, hidden ones included."""
+    link = os.link
+
+    def failing(source: Path, target: Path) -> None:
+        if target.suffix == ".png":
+            raise OSError(28, "No space left on device", str(target))
+        link(source, target)
+
+    monkeypatch.setattr("comparisons.graph_drawing.os.link", failing)
+    with pytest.raises(UserError, match="No space left on device"):
+        draw_graph("two_rooms", None, tmp_path)
+    assert list(tmp_path.iterdir()) == []
