@@ -171,7 +171,7 @@ class Experiment:
         for trigger, goal in self._show(pairs, len(pairs), "learning the pairs"):
             learner = PairLearner(self.layout, self.grounded, trigger, goal, self.spec.seed)
             shown = (trigger, goal) == (self.layout.trigger, self.layout.goal)
-            curves = learner.learn(measure=shown)
+            curves = learner.learn(curves=shown)
             self.curves = curves if shown else self.curves
             self.learners[trigger, goal] = learner
             found.append(Learnt(trigger, goal, learner.wrong_grids(), learner.wrong_starts()))

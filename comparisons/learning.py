@@ -43,9 +43,10 @@ class Curve:
 class PairLearner:
     """Learns one (trigger, goal) pair, the subtasks first and the root last.
 
-    Each subtask learns from the grid that figure 12 measures it from: GotoTrigger from the start,
-    GotoDoor from the trigger, GotoGoal from D1 and then from D2. Then it learns from random grids of its
-    room: from one grid alone, those far off the way are visited too seldom for figure 13 to come out.
+    Each subtask learns from random grids of its room. If figure 12's curves are asked for, it learns
+    before that from the grid that the figure measures it from: GotoTrigger from the start, GotoDoor from
+    the trigger, GotoGoal from D1 and then from D2. From one grid alone, those far off the way are visited
+    too seldom for figure 13 to come out.
 
     Parameters
     ----------
@@ -72,21 +73,13 @@ class PairLearner:
         marks = self.layout.triggers[self.trigger], self.layout.goals[self.goal]
         return self.grounded.model.index.number((cell, *marks, doors))
 
-    def learn(self, *, measure: bool = False) -> dict[str, Curve]:
-        """Carry out every phase of learning; return figure 12's curves if `measure`."""
-        layout = self.layout
-        trigger, doors = layout.triggers[self.trigger], layout.thresholds
-        begin = layout.start if layout.start != trigger else min(self.first - {trigger})
-        to_trigger, *to_doors, to_goal = self.subtasks()
-        phases = [(to_trigger, "", begin), *((to_door, "", trigger) for to_door in to_doors)]
-        phases += [(to_goal, f" from {name}", cell) for name, cell in doors.items()]
-        curves = {
-            task + suffix: self._learn_from(task, start, measure=measure) for task, suffix, start in phases
-        }
+    def learn(self, *, curves: bool = False) -> dict[str, Curve]:
+        """Carry out every phase of learning; return figure 12's curves if they are asked for."""
+        found = self._learn_curves() if curves else {}
         for task in self.subtasks():
             self.learner.train(self.grounded.place(task), self._starts(task), EPISODES)
-        self.learner.train(self.grounded.root, self._starts(to_trigger), ROOT_EPISODES)
-        return curves if measure else {}
+        self.learner.train(self.grounded.root, self._starts(self.subtasks()[0]), ROOT_EPISODES)
+        return found
 
     def step_table(self, task: str) -> Table:
         """Return the greedy policy's steps from every grid of a subtask's room (figure 13)."""
@@ -130,16 +123,24 @@ class PairLearner:
         """Return the room that a subtask works in."""
         return self.second if task.startswith("GotoGoal") else self.first
 
-    def _learn_from(self, task: str, start: Cell, *, measure: bool) -> Curve:
-        """Learn a subtask from one grid; if `measure`, take the greedy policy's steps after each episode."""
+    def _learn_curves(self) -> dict[str, Curve]:
+        """Learn each subtask from the grid that figure 12 measures it from."""
+        layout = self.layout
+        trigger, doors = layout.triggers[self.trigger], layout.thresholds
+        begin = layout.start if layout.start != trigger else min(self.first - {trigger})
+        to_trigger, *to_doors, to_goal = self.subtasks()
+        phases = [(to_trigger, "", begin), *((to_door, "", trigger) for to_door in to_doors)]
+        phases += [(to_goal, f" from {name}", cell) for name, cell in doors.items()]
+        return {task + suffix: self._learn_from(task, start) for task, suffix, start in phases}
+
+    def _learn_from(self, task: str, start: Cell) -> Curve:
+        """Learn a subtask from one grid, taking the greedy policy's steps after each episode."""
         place, at = self.grounded.place(task), self.state(start, self._doors(task))
         greedy: list[int | None] = []
         far = len(self.layout.cells)
-
-        def after_each() -> None:
-            greedy.append(self.learner.greedy_steps(place, at, limit=far))
-
-        training = self.learner.train(place, [at], EPISODES, after_each if measure else None)
+        training = self.learner.train(
+            place, [at], EPISODES, lambda: greedy.append(self.learner.greedy_steps(place, at, limit=far))
+        )
         optimum = int(task_field(self.grounded.model, self.grounded.nodes[place]).distance[at])
         return Curve(start, optimum, tuple(training), tuple(greedy))
 

@@ -84,10 +84,11 @@ def learning(experiment: Experiment, found: Findings) -> Part:
     """Report subtask learning and hold it to the oracle (section 6.2)."""
     doors, single = found.gaps
     how = (
-        f"MAXQ-0 learns each of the {len(found.pairs)} pairs of trigger and goal by itself. Every subtask "
-        f"learns for {EPISODES} episodes from the grid that figure 12 measures it from (GotoGoal from D1, "
-        f"then from D2), then for {EPISODES} from random grids of its room; the root comes last. The "
-        "learning rate is 0.9, multiplied by 0.9 every 40 episodes; gamma is 1."
+        f"MAXQ-0 learns each of the {len(found.pairs)} pairs of trigger and goal by itself: every subtask "
+        f"for {EPISODES} episodes from random grids of its room, the root at last. The pair shown learns "
+        f"each subtask for {EPISODES} episodes before that from the grid that figure 12 measures it from, "
+        "GotoGoal from D1 and then from D2. The learning rate is 0.9, multiplied by 0.9 every 40 episodes; "
+        "gamma is 1."
     )
     lost = (
         "With GotoDoor bound to each door, the recursively optimal policy is globally optimal from "

@@ -6,12 +6,12 @@ A learner adds its tables, the value of a child, and one update: what it learns 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from itertools import accumulate
-from typing import TypeVar
+from typing import Final, TypeVar
 
 from hierarchy import GroundGraph
 from planners.exploration import Exploration, Explorer, first_best
@@ -22,6 +22,7 @@ Trace = list[tuple[int, float]]
 """Each primitive step of a task: the state that it was taken in, and its reward."""
 
 T = TypeVar("T")
+_FIRST: Final[Sequence[int]] = (0,)  # the one step that a caller learns at without all-states updating
 
 _FOLLOWING = 0x466F_6C6C_6F77  # names the stream of greedy ways
 
@@ -183,17 +184,16 @@ class Learner(ABC):
         self.episodes[task] += 1
         return steps, state
 
-    def _updated(self, task: int, k: int, trace: Trace) -> Iterator[int]:
-        """Yield which of a child's steps its caller learns at, the last first.
+    def _updated(self, task: int, k: int, trace: Trace) -> Sequence[int]:
+        """Return which of a child's steps its caller learns at, the last first.
 
         In all-states updating these are all whose state the child may be called in, for from there the
         child would have gone on as it did (Dietterich 2000, section 4.3).
         """
-        if self.settings.all_states:
-            for at in range(len(trace) - 1, 0, -1):
-                if k in self._available[task][trace[at][0]]:
-                    yield at
-        yield 0
+        if not self.settings.all_states:
+            return _FIRST
+        states = range(len(trace) - 1, 0, -1)
+        return (*(at for at in states if k in self._available[task][trace[at][0]]), 0)
 
     def _explore(self, task: int, state: int, level: float) -> int:
         """Choose a child by the task's way to explore."""
