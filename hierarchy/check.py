@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
 from hierarchy.grounding import GroundCall, GroundGraph, GroundTask, ground
-from hierarchy.predicates import Param, Predicate, Term, Var
+from hierarchy.predicates import Predicate
+from hierarchy.terms import Param, Term, Var
 from worlds import TransitionModel
 
 

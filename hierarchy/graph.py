@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 import networkx as nx
 
-from hierarchy.predicates import ALWAYS, Constant, Param, Predicate, Term, Var
+from hierarchy.predicates import ALWAYS, Predicate
+from hierarchy.terms import Constant, Param, Term, Var
 from worlds import StateIndex, UserError, Variable
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.graph import Call, Task, TaskGraph
-from hierarchy.predicates import ALWAYS, Constant, Equal, Var
+from hierarchy.predicates import ALWAYS
+from hierarchy.terms import Constant, Equal, Var
 from worlds import TransitionModel
 
 Binding = tuple[tuple[str, Constant], ...]

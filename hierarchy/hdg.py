@@ -7,7 +7,8 @@ from functools import reduce
 from operator import or_
 
 from hierarchy.graph import Call, Task, TaskGraph
-from hierarchy.predicates import Param, Predicate, ValueSet, Var
+from hierarchy.predicates import Predicate
+from hierarchy.terms import Param, ValueSet, Var
 from worlds import ACTIONS
 from worlds.hdg import LandmarkMaze, landmark_variables
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hierarchy.graph import Call, TaskGraph
-from hierarchy.predicates import Param
+from hierarchy.terms import Param
 from worlds import TransitionModel
 from worlds.taxi import ABOARD, DELIVERED, SITES
 

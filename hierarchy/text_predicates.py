@@ -23,19 +23,8 @@ import json
 from collections.abc import Hashable
 from typing import Any, Final, NoReturn, cast
 
-from hierarchy.predicates import (
-    AllOf,
-    AnyOf,
-    Constant,
-    Equal,
-    Implies,
-    Member,
-    Not,
-    Ordered,
-    Predicate,
-    Relation,
-    Term,
-)
+from hierarchy.predicates import AllOf, AnyOf, Implies, Not, Predicate
+from hierarchy.terms import Constant, Equal, Member, Ordered, Relation, Term
 from hierarchy.text_words import KEYWORDS, PredicateError, Scope, Token, literal, suggestion, tokens
 from worlds import Variable
 

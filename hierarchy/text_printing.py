@@ -6,19 +6,8 @@ import json
 from typing import cast
 
 from hierarchy.graph import TaskGraphError
-from hierarchy.predicates import (
-    AllOf,
-    AnyOf,
-    Constant,
-    Equal,
-    Implies,
-    Member,
-    Not,
-    Ordered,
-    Predicate,
-    Term,
-    ValueSet,
-)
+from hierarchy.predicates import AllOf, AnyOf, Implies, Not, Predicate
+from hierarchy.terms import Constant, Equal, Member, Ordered, Term, ValueSet
 from hierarchy.text_words import Scope, bare_or, name_in_quotes, value_in_quotes
 from worlds import Variable
 

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from hierarchy.graph import Call, TaskGraph, TaskGraphError
-from hierarchy.predicates import ALWAYS, Constant, Param, Predicate, Term, ValueSet, Var
+from hierarchy.predicates import ALWAYS, Predicate
 from hierarchy.schema import CallText, TaskText, ValuesText, validated
+from hierarchy.terms import Constant, Param, Term, ValueSet, Var
 from hierarchy.text_nodes import Document, Fault, TaskGraphTextError, read_yaml
 from hierarchy.text_nodes import Path as KeyPath
 from hierarchy.text_predicates import parse_predicate, parse_side

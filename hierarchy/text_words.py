@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from typing import Final, cast
 
 from hierarchy.graph import TaskGraphError
-from hierarchy.predicates import Term, ValueSet
+from hierarchy.terms import Term, ValueSet
 
 _TOKEN: Final = re.compile(
     r"""(?P<value>"(?:[^"\\]|\\.)*")|(?P<name>`(?:[^`]|``)*`)|(?P<sign><=|>=|!=|[=<>(){}])"""

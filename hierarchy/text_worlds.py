@@ -15,7 +15,7 @@ from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from typing import Final
 
-from hierarchy.predicates import ValueSet
+from hierarchy.terms import ValueSet
 from worlds import (
     ACTIONS,
     Layout,

@@ -7,7 +7,8 @@ from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
 import yaml
 
 from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
-from hierarchy.predicates import ALWAYS, AllOf, AnyOf, Implies, Member, Not, Param, Predicate, ValueSet, Var
+from hierarchy.predicates import ALWAYS, AllOf, AnyOf, Implies, Not, Predicate
+from hierarchy.terms import Member, Param, ValueSet, Var
 from hierarchy.text_nodes import TaskGraphTextError
 from hierarchy.text_printing import is_listed, predicate_text, side_text
 from hierarchy.text_reading import parse_graph

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from hierarchy.graph import Task, TaskGraph, TaskGraphError
-from hierarchy.predicates import Param, ValueSet
+from hierarchy.terms import Param, ValueSet
 from worlds import ACTIONS, Cell, Layout, maze_variables
 
 

@@ -114,12 +114,21 @@ def test_a_layout_that_the_task_graph_does_not_fit_is_refused(
     assert "layout open has no door" in message
 
 
-def test_help_is_light() -> None:
-    """Neither --help nor an import of the graph's language loads torch, PyBullet, OpenCV or matplotlib."""
-    heavy = {"torch", "pybullet", "cv2", "matplotlib"}
-    for code in ("import hierarchy", "from comparisons.cli import app; app(['--help'])", "import planners"):
-        program = f"import sys\ntry:\n    {code}\nexcept SystemExit:\n    pass\nprint(*sys.modules)"
-        done = subprocess.run(  # noqa: S603 - our own code
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True
-        )
-        assert not heavy & set(done.stdout.splitlines()[-1].split()), code
+@pytest.mark.parametrize(
+    ("code", "heavy"),
+    [
+        ("import hierarchy", {"torch", "pybullet", "cv2", "matplotlib", "scipy"}),
+        (
+            "from comparisons.cli import app; app(['--help'])",
+            {"torch", "pybullet", "cv2", "matplotlib", "scipy"},
+        ),
+        ("import planners", {"torch", "pybullet", "cv2", "matplotlib"}),
+    ],
+)
+def test_help_is_light(code: str, heavy: set[str]) -> None:
+    """What is looked at first loads no heavy library."""
+    program = f"import sys\ntry:\n    {code}\nexcept SystemExit:\n    pass\nprint(*sys.modules)"
+    done = subprocess.run(  # noqa: S603 - our own code
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True
+    )
+    assert not heavy & set(done.stdout.splitlines()[-1].split())

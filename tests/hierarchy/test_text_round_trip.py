@@ -20,8 +20,9 @@ from hierarchy import (
     Var,
     two_rooms,
 )
-from hierarchy.predicates import AllOf, AnyOf, Not, Ordered
+from hierarchy.predicates import AllOf, AnyOf, Not
 from hierarchy.taxi import taxi_graph
+from hierarchy.terms import Ordered
 from hierarchy.text import TextWorld, graph_text, load_graph, load_world, maze_world, parse_graph
 from hierarchy.text_predicates import parse_predicate
 from hierarchy.text_printing import predicate_text
