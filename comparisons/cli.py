@@ -67,7 +67,7 @@ def doctor() -> int:
 
 
 @app.command
-def check(graph: str, /, *, world: str | None = None) -> int:
+def check(graph: str, /, *, world: str | None = None, gamma: float = 1.0) -> int:
     """Check a task graph: print it, what is wrong with it, what it stores, and what is proved safe.
 
     Exit status 0 says that it may run, 1 that there are findings, 2 that it cannot be read.
@@ -78,10 +78,12 @@ def check(graph: str, /, *, world: str | None = None) -> int:
         A YAML file, or the name of a graph that comes with the package (two_rooms).
     world
         World to check it on: a name or a .maze file. Defaults to the one that the graph names.
+    gamma
+        Discount factor that it is to be learnt with; below 1, tables that forget time are findings.
     """
     from comparisons.graph_commands import check_graph
 
-    verdict = check_graph(graph, world)
+    verdict = check_graph(graph, world, gamma)
     print(verdict.text)
     return 0 if verdict.well else 1
 

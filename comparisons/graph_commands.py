@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 from hierarchy import ALWAYS, Call, GroundGraph, Task, TaskGraph, check, ground, value_counts
 from hierarchy.abstraction import prove_abstraction
+from hierarchy.abstraction_funnel import discounted_funnels
 from hierarchy.text import load_graph, load_world
+from worlds import UserError
 
 
 @dataclass(frozen=True)
@@ -18,7 +20,7 @@ class Verdict:
     well: bool
 
 
-def check_graph(name: str, world: str | None = None) -> Verdict:
+def check_graph(name: str, world: str | None = None, gamma: float = 1.0) -> Verdict:
     r"""Describe a task graph, check it on its world, and count its values.
 
     Parameters
@@ -27,11 +29,14 @@ def check_graph(name: str, world: str | None = None) -> Verdict:
         A graph's name or the path of its text.
     world
         The world's name. Defaults to the one that the text names.
+    gamma
+        Discount factor that the graph is to be learnt with. Below 1, a call whose table forgets how long
+        the child takes is a finding.
 
     Raises
     ------
     UserError
-        If the graph or the world cannot be read.
+        If the graph or the world cannot be read, or gamma is not in (0, 1].
 
     Examples
     --------
@@ -41,6 +46,8 @@ def check_graph(name: str, world: str | None = None) -> Verdict:
     >>> verdict.well
     True
     """
+    if not 0 < gamma <= 1:
+        raise UserError(f"--gamma {gamma:g}: a discount factor lies above 0 and up to 1; give one that does")
     graph, used = load_graph(name, None if world is None else load_world(world))
     model = used.model()
     lines = [
@@ -49,16 +56,14 @@ def check_graph(name: str, world: str | None = None) -> Verdict:
         *describe(graph),
     ]
     findings = check(graph, model)
-    if findings:
-        lines += ["", f"findings: {len(findings)}", *(f"  {finding}" for finding in findings)]
-    else:
-        grounded = ground(graph, model)
-        lines += ["", "findings: none", "", *_counted(grounded)]
-        lines += [
-            "",
-            "state abstraction:",
-            *(f"  {line}" for line in str(prove_abstraction(grounded)).splitlines()),
-        ]
+    grounded = None if findings else ground(graph, model)
+    if grounded is not None:
+        findings = discounted_funnels(grounded, gamma)
+    found = [f"findings: {len(findings)}", *(f"  {finding}" for finding in findings)]
+    lines += ["", *(found if findings else ["findings: none"])]
+    if grounded is not None:
+        proof = str(prove_abstraction(grounded, gamma=gamma)).splitlines()
+        lines += ["", *_counted(grounded), "", "state abstraction:", *(f"  {line}" for line in proof)]
     return Verdict("\n".join(lines), not findings)
 
 

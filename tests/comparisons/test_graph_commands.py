@@ -139,3 +139,18 @@ def test_drawings_appear_all_or_none(monkeypatch: pytest.MonkeyPatch, tmp_path: 
     with pytest.raises(UserError, match="No space left on device"):
         draw_graph("two_rooms", None, tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_check_with_discounting_finds_funnels(capsys: pytest.CaptureFixture[str]) -> None:
+    """Below gamma 1 the paper's root forgets time in three of its calls; at 1 it does not matter."""
+    with pytest.raises(SystemExit) as ended:
+        main(["check", "two_rooms", "--gamma", "0.9"])
+    out = capsys.readouterr().out
+    assert ended.value.code == 1
+    assert "findings: 3" in out
+    assert "Root -> GotoTrigger(target=trigger): with gamma = 0.9" in out
+    assert "44 of 50 tables proved safe" in out
+    with pytest.raises(SystemExit) as refused:
+        main(["check", "two_rooms", "--gamma", "1.5"])
+    assert refused.value.code == 2
+    assert "lies above 0 and up to 1" in capsys.readouterr().err
