@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from difflib import get_close_matches
 
 import networkx as nx
 import numpy as np
@@ -14,7 +13,7 @@ from hierarchy.graph import Call, Task, TaskGraph, TaskGraphError
 from hierarchy.grounding import GroundCall, GroundGraph, GroundTask, ground
 from hierarchy.predicates import Predicate
 from hierarchy.terms import Param, Term, Var
-from worlds import TransitionModel
+from worlds import TransitionModel, suggest
 
 
 @dataclass(frozen=True)
@@ -297,6 +296,4 @@ def _describe(grounded: GroundGraph, mask: NDArray[np.bool_]) -> str:
 
 
 def _suggest(name: str, known: Iterable[str], what: str) -> str:
-    names = sorted(known)
-    near = get_close_matches(name, names, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"known {what}: {', '.join(names) or 'none'}"
+    return suggest(name, sorted(known), f"known {what}:")

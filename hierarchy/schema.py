@@ -18,7 +18,7 @@ from pydantic import (
 from pydantic.json_schema import WithJsonSchema
 
 from hierarchy.text_nodes import Document, Fault, Path
-from hierarchy.text_words import suggestion
+from worlds import suggest
 
 _SCALAR: Final = {"type": ["string", "number", "boolean"]}
 _KEYS: Final = ("it is no mapping of keys to values", "write keys with values")
@@ -187,14 +187,14 @@ def _fault(document: Document, error: dict[str, Any]) -> Fault:
     path: Path = tuple(part for part in error["loc"] if part != "[key]")
     kind, last = error["type"], str(path[-1]) if path else ""
     if kind == "extra_forbidden":
-        return document.fault(path, f"unknown key {last!r}", suggestion(last, _known_keys(path), "keys"))
+        return document.fault(path, f"unknown key {last!r}", suggest(last, _known_keys(path), "keys:"))
     if kind == "missing":
         return document.fault(path[:-1], f"{last!r} is missing", f"add {last}: ...")
     if kind == "value_error":
         problem, _, mend = str(error["ctx"]["error"]).partition("; ")
     elif kind == "dict_type" and len(path) == 5 and path[2] == "do":  # a binding, or a key gone wrong
         problem = f"{last!r} is given {error['input']!r}, which binds no parameters"
-        mend = suggestion(last, ("when", "uses"), "keys besides the child")
+        mend = suggest(last, ("when", "uses"), "keys besides the child:")
     else:
         problem, mend = _WORDS.get(kind, (error["msg"], "mend it"))
     return document.fault(path, problem, mend)

@@ -25,8 +25,8 @@ from typing import Any, Final, NoReturn, cast
 
 from hierarchy.predicates import AllOf, AnyOf, Implies, Not, Predicate
 from hierarchy.terms import Constant, Equal, Member, Ordered, Relation, Term
-from hierarchy.text_words import KEYWORDS, PredicateError, Scope, Token, literal, suggestion, tokens
-from worlds import Variable
+from hierarchy.text_words import KEYWORDS, PredicateError, Scope, Token, literal, tokens
+from worlds import Variable, suggest
 
 _RELATIONS: Final = ("=", "!=", "<", "<=", ">", ">=")
 
@@ -179,7 +179,7 @@ class _Parser:
             if named.text not in self.scope.sets:
                 problem = f"unknown set of values {named.text!r}"
                 known = named.text in term.domain.labels
-                mend = f"write {{{named.text}}}" if known else suggestion(named.text, self.scope.sets, "sets")
+                mend = f"write {{{named.text}}}" if known else suggest(named.text, self.scope.sets, "sets:")
                 self.fail(problem, mend, column)
             values = self.scope.sets[named.text]
             if foreign := [value for value in values.values if value not in term.domain]:
@@ -220,7 +220,7 @@ class _Parser:
 
     def known_term(self, side: Token) -> Term:
         if side.kind == "value" or side.text not in self.scope.terms:
-            mend = suggestion(side.text, self.scope.terms, "names")
+            mend = suggest(side.text, self.scope.terms, "names:")
             self.fail(f"unknown name {side.text!r}", mend, side.column)
         return self.scope.terms[side.text]
 
@@ -236,7 +236,7 @@ class _Parser:
         if len(parts) > 1 and set(parts) <= set(domain.labels):
             mend = f"separate values by a comma and a blank: {', '.join(parts)}"
         else:
-            mend = suggestion(side.text, (*domain.labels, *self.scope.terms), "there are")
+            mend = suggest(side.text, (*domain.labels, *self.scope.terms), "there are:")
         self.fail(f"unknown value {side.text!r} of {domain.name}", mend, side.column)
 
 

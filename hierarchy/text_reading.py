@@ -14,9 +14,9 @@ from hierarchy.terms import Constant, Param, Term, ValueSet, Var
 from hierarchy.text_nodes import Document, Fault, TaskGraphTextError, read_yaml
 from hierarchy.text_nodes import Path as KeyPath
 from hierarchy.text_predicates import parse_predicate, parse_side
-from hierarchy.text_words import PredicateError, Scope, literal, suggestion
+from hierarchy.text_words import PredicateError, Scope, literal
 from hierarchy.text_worlds import MAZE_SUFFIX, TextWorld, load_world, maze_world
-from worlds import UserError, Variable, load_layout
+from worlds import UserError, Variable, load_layout, suggest
 
 _SUFFIX: Final = ".yaml"
 RESERVED: Final = ("when", "uses")
@@ -71,7 +71,7 @@ def load_graph(name: str | Path, world: TextWorld | None = None) -> LoadedGraph:
         return parse_graph(text, name + _SUFFIX, world)
     path = Path(name)
     if not path.is_file():
-        mend = suggestion(str(name), graph_names(), "graphs by name")
+        mend = suggest(str(name), graph_names(), "graphs by name:")
         raise UserError(f"{name}: no task graph of this name and no such file; {mend}")
     try:
         text = path.read_text(encoding="utf-8")
@@ -193,7 +193,7 @@ class _Builder:
             read = [(label, text, literal(text)) for label, text in form.values or ()]
             return [(str(value) if label == text else label, value) for label, text, value in read]
         if form.of not in self.variables:
-            mend = suggestion(form.of, self.variables, "state variables")
+            mend = suggest(form.of, self.variables, "state variables:")
             self.fail((*path, "of"), f"unknown state variable {form.of!r}", mend)
             return []
         domain = self.variables[form.of].domain
@@ -204,7 +204,7 @@ class _Builder:
             if text in domain.labels:
                 found.append((label, domain.values[domain.labels.index(text)]))
             else:
-                mend = suggestion(text, domain.labels, "its values")
+                mend = suggest(text, domain.labels, "its values:")
                 self.fail((*path, "values", label), f"unknown value {text!r} of {form.of}", mend)
         return found
 
@@ -232,7 +232,7 @@ class _Builder:
         """Return state variables by name."""
         for place, name in enumerate(names):
             if name not in self.variables:
-                mend = suggestion(name, self.variables, "state variables")
+                mend = suggest(name, self.variables, "state variables:")
                 self.fail((*path, place), f"unknown state variable {name!r}", mend)
         return [self.variables[name] for name in names if name in self.variables]
 
@@ -246,7 +246,7 @@ class _Builder:
     def call(self, form: CallText, scope: Scope, path: KeyPath) -> Call:
         child = form.child
         if child not in self.params and child not in self.world.actions:
-            mend = suggestion(child, (*self.params, *self.world.actions), "tasks and actions")
+            mend = suggest(child, (*self.params, *self.world.actions), "tasks and actions:")
             self.fail((*path, child), f"unknown task or action {child!r}", mend)
             return Call(child)
         params = {param.name: param for param in self.params.get(child, ())}
@@ -254,7 +254,7 @@ class _Builder:
         for name, text in form.binding.items():
             here = (*path, child, name)
             if name not in params:
-                mend = suggestion(name, params, f"parameters of {child}")
+                mend = suggest(name, params, f"parameters of {child}:")
                 self.fail(here, f"unknown parameter {name!r} of {child}", mend)
                 continue
             try:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 import re
 from ast import literal_eval
-from collections.abc import Callable, Hashable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from typing import Final, cast
 
 from hierarchy.graph import TaskGraphError
@@ -37,19 +36,6 @@ class Scope:
 
     terms: Mapping[str, Term]
     sets: Mapping[str, ValueSet] = field(default_factory=dict)
-
-
-def suggestion(name: str, known: Iterable[str], what: str) -> str:
-    """Return a mend for an unknown name: the nearest that is known, or all of them.
-
-    >>> suggestion("dors", ["robot", "doors"], "state variables")
-    "did you mean 'doors'?"
-    """
-    names = list(dict.fromkeys(known))
-    near = get_close_matches(name, names, n=1)
-    most = 12  # a maze has many cells
-    listed = ", ".join(names[:most]) + (", ..." if len(names) > most else "")
-    return f"did you mean {near[0]!r}?" if near else f"{what}: {listed or 'none'}"
 
 
 @dataclass(frozen=True)

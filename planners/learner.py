@@ -8,7 +8,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from functools import cached_property
 from itertools import accumulate
 from typing import Final, TypeVar
@@ -16,7 +15,7 @@ from typing import Final, TypeVar
 from hierarchy import GroundGraph
 from planners.exploration import Exploration, Explorer, first_best
 from planners.schedules import LearningRate, Rate
-from worlds import Stream, TransitionModel, UserError
+from worlds import Stream, TransitionModel, UserError, suggest
 
 Trace = list[tuple[int, float]]
 """Each primitive step of a task: the state that it was taken in, and its reward."""
@@ -282,8 +281,7 @@ def _by_task(grounded: GroundGraph, default: T, named: Mapping[str, T]) -> list[
     known = sorted({node.name for node in tasks} | {node.task for node in tasks})
     for name in named:
         if name not in known:
-            near = get_close_matches(name, known, n=1)
-            mend = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(known)}"
+            mend = suggest(name, known, "there are")
             raise UserError(f"settings name {name!r}, which is no task of {grounded.graph.name}; {mend}")
     return [named.get(node.name, named.get(node.task, default)) for node in grounded.nodes]
 

@@ -1,6 +1,6 @@
 """What a robot lives in: state variables, mazes, exact transition models, environments, the PyBullet twin."""
 
-from worlds.errors import LayoutError, UserError
+from worlds.errors import LayoutError, UserError, suggest
 from worlds.finite import WorldError, finite_world
 from worlds.layout import (
     ACTIONS,
@@ -54,4 +54,5 @@ __all__ = [
     "roll",
     "state_number",
     "step",
+    "suggest",
 ]

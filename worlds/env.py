@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from worlds.appearing import random_obstacles, shortest_way
 from worlds.drawing import Picture, draw_maze
-from worlds.errors import UserError
+from worlds.errors import UserError, suggest
 from worlds.layout import ACTIONS, Cell, Layout, Obstacle
-from worlds.layout_text import load_layout, suggest
+from worlds.layout_text import load_layout
 from worlds.maze import Episode, MazeState, Outcome, step
 from worlds.randomness import Stream
 

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Final
+
+_LISTED: Final = 12  # a maze has many cells
+
 
 class UserError(ValueError):
     """Something the user gave is wrong; the message names what, where and how to mend it.
@@ -38,3 +44,19 @@ class LayoutError(UserError):
         self.line = line
         self.problem = problem
         self.mend = mend
+
+
+def suggest(word: str, known: Iterable[str], otherwise: str = "use one of") -> str:
+    """Return a mend for an unknown word: the nearest known one, or `otherwise` and what is known.
+
+    Examples
+    --------
+    >>> suggest("spere", ["cube", "sphere"]), suggest("pyramid", ["cube", "sphere"])
+    ("did you mean 'sphere'?", 'use one of cube, sphere')
+    """
+    names = list(dict.fromkeys(known))
+    near = get_close_matches(word, names, n=1)
+    if near:
+        return f"did you mean {near[0]!r}?"
+    more = ", ..." if len(names) > _LISTED else ""
+    return f"{otherwise} {', '.join(names[:_LISTED]) or 'none'}{more}"

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import NoReturn
 
-from worlds.errors import LayoutError, UserError
+from worlds.errors import LayoutError, UserError, suggest
 from worlds.layout import KINDS, SIZES, Appears, Cell, Edge, Kind, Layout, Obstacle, Size, edge
 from worlds.layout_checks import layout_faults
 
@@ -317,16 +316,3 @@ def _misspelt_key(words: list[str], section: str) -> bool:
     else:
         fits = len(words) >= _OBSTACLE_WORDS
     return not fits and bool(get_close_matches(words[0], _KEYS, n=1))
-
-
-def suggest(word: str, known: Iterable[str]) -> str:
-    """Return a mend for an unknown word: the nearest known one, or all of them.
-
-    Examples
-    --------
-    >>> suggest("spere", KINDS), suggest("pyramid", KINDS)
-    ("did you mean 'sphere'?", 'use one of cube, sphere')
-    """
-    words = tuple(known)
-    near = get_close_matches(word, words, n=1)
-    return f"did you mean {near[0]!r}?" if near else f"use one of {', '.join(words)}"
