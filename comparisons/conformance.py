@@ -11,7 +11,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hierarchy import GroundGraph, TaskGraph, check, checked, ground, two_rooms
+from hierarchy import GroundGraph, TaskGraph, checked, two_rooms
+from hierarchy.check import examine
 from perception.protocol import LABELS, Backend, Detection, View
 from planners import task_field
 from worlds import Layout, Stream, TransitionModel, maze_model, parse_layout
@@ -91,9 +92,9 @@ def check_graph(graph: TaskGraph, model: TransitionModel) -> None:
     """
     _hold(graph.index == model.index, "the graph and the world have different state variables")
     _hold(graph.actions == model.actions, "the graph and the world have different actions, or another order")
-    findings = check(graph, model)
+    findings, grounded = examine(graph, model)
     _hold(not findings, "; ".join(map(str, findings)))
-    grounded = ground(graph, model)
+    assert grounded is not None, "a graph without findings is grounded"
     for node in grounded.nodes:
         if node.leaf is None:
             task, binding = graph.tasks[node.task], {name: c.value for name, c in node.binding}

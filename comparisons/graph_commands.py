@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from hierarchy import ALWAYS, Call, GroundGraph, Task, TaskGraph, check, ground, value_counts
+from hierarchy import ALWAYS, Call, GroundGraph, Task, TaskGraph, value_counts
 from hierarchy.abstraction import prove_abstraction
 from hierarchy.abstraction_funnel import discounted_funnels
+from hierarchy.check import examine
 from hierarchy.text import load_graph, load_world
 from worlds import UserError
 
@@ -55,8 +56,8 @@ def check_graph(name: str, world: str | None = None, gamma: float = 1.0) -> Verd
         f"{len(graph.actions)} primitive actions, {model.index.size} states",
         *describe(graph),
     ]
-    findings = check(graph, model)
-    grounded = None if findings else ground(graph, model)
+    findings, examined = examine(graph, model)
+    grounded = None if findings else examined
     if grounded is not None:
         findings = discounted_funnels(grounded, gamma)
     found = [f"findings: {len(findings)}", *(f"  {finding}" for finding in findings)]

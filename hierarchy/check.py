@@ -46,8 +46,16 @@ def check(graph: TaskGraph, model: TransitionModel) -> tuple[Finding, ...]:
     >>> check(two_rooms(maze), maze_model(maze))
     ()
     """
+    return examine(graph, model)[0]
+
+
+def examine(graph: TaskGraph, model: TransitionModel) -> tuple[tuple[Finding, ...], GroundGraph | None]:
+    """Return what `check` finds, and the ground graph if the declaration allows grounding at all."""
     findings = tuple(_declaration(graph))
-    return findings or tuple(_behaviour(ground(graph, model)))
+    if findings:
+        return findings, None
+    grounded = ground(graph, model)
+    return tuple(_behaviour(grounded)), grounded
 
 
 def checked(graph: TaskGraph, model: TransitionModel) -> GroundGraph:
@@ -58,11 +66,11 @@ def checked(graph: TaskGraph, model: TransitionModel) -> GroundGraph:
     TaskGraphError
         If it does not; the message lists every finding.
     """
-    findings = check(graph, model)
-    if findings:
+    findings, grounded = examine(graph, model)
+    if findings or grounded is None:
         listed = "\n".join(f"  {finding}" for finding in findings)
         raise TaskGraphError(f"task graph {graph.name} cannot run:\n{listed}")
-    return ground(graph, model)
+    return grounded
 
 
 def _declaration(graph: TaskGraph) -> Iterator[Finding]:

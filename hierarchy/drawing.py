@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import networkx as nx
 
-from hierarchy.graph import TaskGraph
+from hierarchy.graph import Call, Task, TaskGraph
 from hierarchy.predicates import ALWAYS
 
 
@@ -24,16 +24,13 @@ def mermaid(graph: TaskGraph) -> str:
     lines = ["flowchart TD"]
     tasks = sorted(graph.tasks.values(), key=lambda task: task.name != graph.root.name)
     for task in tasks:
-        params = ", ".join(param.name for param in task.params)
-        label = f"{task.name}({params})" if params else task.name
+        label = _title(task)
         box = f'(["{label}"])' if task.name == graph.root.name else f'["{label}"]'
         lines.append(f"    {task.name}{box}")
     lines += [f"    {action}{{{{{action}}}}}" for action in graph.actions]
     for task in tasks:
         for call in task.do:
-            bound = ", ".join(f"{name}={value}" for name, value in call.binding)
-            guard = "" if call.guard == ALWAYS else f"when {call.guard}"
-            label = "<br>".join(part for part in (bound, guard) if part)
+            label = "<br>".join(_notes(call))
             arrow = f'-- "{label}" -->' if label else "-->"
             lines.append(f"    {task.name} {arrow} {call.child}")
     return "\n".join(lines) + "\n"
@@ -57,19 +54,29 @@ def dot(graph: TaskGraph) -> str:
     lines += ['    node [fontname="Helvetica"]', '    edge [fontname="Helvetica", fontsize=10]']
     tasks = sorted(graph.tasks.values(), key=lambda task: task.name != graph.root.name)
     for task in tasks:
-        params = ", ".join(param.name for param in task.params)
-        label = f"{task.name}({params})" if params else task.name
+        label = _title(task)
         style = "rounded,bold" if task.name == graph.root.name else "rounded"
         lines.append(f'    {_quoted(task.name)} [label={_quoted(label)}, shape=box, style="{style}"]')
     lines += [f"    {_quoted(action)} [shape=hexagon]" for action in graph.actions]
     for task in tasks:
         for call in task.do:
-            bound = ", ".join(f"{name}={value}" for name, value in call.binding)
-            guard = "" if call.guard == ALWAYS else f"when {call.guard}"
-            label = "\n".join(part for part in (bound, guard) if part)
+            label = "\n".join(_notes(call))
             note = f" [label={_quoted(label)}]" if label else ""
             lines.append(f"    {_quoted(task.name)} -> {_quoted(call.child)}{note}")
     return "\n".join([*lines, "}"]) + "\n"
+
+
+def _title(task: Task) -> str:
+    """Return a task's name with its parameters."""
+    params = ", ".join(param.name for param in task.params)
+    return f"{task.name}({params})" if params else task.name
+
+
+def _notes(call: Call) -> list[str]:
+    """Return what stands on a call's edge: its binding and its guard, where it has them."""
+    bound = ", ".join(f"{name}={value}" for name, value in call.binding)
+    guard = "" if call.guard == ALWAYS else f"when {call.guard}"
+    return [part for part in (bound, guard) if part]
 
 
 def _quoted(text: str) -> str:

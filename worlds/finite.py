@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import namedtuple
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from keyword import iskeyword
 from math import isfinite
 from numbers import Real
@@ -14,7 +13,7 @@ from typing import Any, Final, NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from worlds.errors import UserError
+from worlds.errors import UserError, suggest
 from worlds.model import TransitionModel
 from worlds.variables import StateIndex, Variable
 
@@ -206,9 +205,9 @@ class _Reader:
     def _merged(self, state: State | None, changes: Mapping[str, Hashable], where: str) -> tuple[Any, ...]:
         for name in changes:
             if name not in self.index.names:
-                near = get_close_matches(str(name), self.index.names, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"there are {', '.join(self.index.names)}"
-                _fail(where, f"there is no variable {name!r}", hint)
+                _fail(
+                    where, f"there is no variable {name!r}", suggest(str(name), self.index.names, "there are")
+                )
         missing = [name for name in self.index.names if name not in changes]
         if state is None and missing:
             _fail(where, f"no value for {', '.join(missing)}", "give a start all its values")

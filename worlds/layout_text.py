@@ -49,8 +49,7 @@ def load_layout(name: str | Path) -> Layout:
         return parse_layout(text, source=name + _SUFFIX)
     path = Path(name)
     if not path.is_file():
-        near = get_close_matches(str(name), layout_names(), n=1)
-        hint = f"did you mean {near[0]!r}?" if near else f"layouts by name: {', '.join(layout_names())}"
+        hint = suggest(str(name), layout_names(), "layouts by name:")
         raise UserError(f"{name}: no layout of this name and no such file; {hint}")
     try:
         text = path.read_text(encoding="utf-8")
