@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from pathlib import Path
 
 import networkx as nx
@@ -40,7 +41,10 @@ def draw_graph(name: str, world: str | None, out: Path) -> tuple[Path, ...]:
     stem = Path(name).stem
     paths = [out / f"{stem}.{kind}" for kind in ("mmd", "dot", "png", "svg")]
     _refuse_existing(paths)
-    drawn = picture(task_graph_figure(task_graph_picture(graph)))
+    with warnings.catch_warnings():
+        # Letters that the font lacks are drawn as empty boxes; the Mermaid and Graphviz files have them.
+        warnings.filterwarnings("ignore", "Glyph .* missing from font")
+        drawn = picture(task_graph_figure(task_graph_picture(graph)))
     contents = [mermaid(graph).encode(), dot(graph).encode(), drawn.png, drawn.svg.encode()]
     _write_all(out, dict(zip(paths, contents, strict=True)))
     return tuple(paths)

@@ -1,6 +1,6 @@
 """How many values a ground graph stores, table by table, for the variables declared and what is proved.
 
-For Taxi this gives the counts of Dietterich (2000), section 5.3: 632 against 3000 of flat Q.
+For Taxi this gives the counts of Dietterich (2000), section 5.1.6: 632 against 3000 of flat Q.
 """
 
 from __future__ import annotations

@@ -6,12 +6,13 @@ has ended there, never asks its tables about it (shielding: Dietterich 2000, sec
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hierarchy.grounding import GroundGraph, GroundTask
+from worlds import UserError
 
 Mask = NDArray[np.bool_]
 
@@ -73,24 +74,71 @@ def course(grounded: GroundGraph, place: int, entry: Mask) -> Course:
     >>> then.decides.tolist(), then.ends.tolist()
     ([False, True, False, False], [False, False, True, False])
     """
-    node, model = grounded.nodes[place], grounded.model
-    if not node.calls:
+    search = _Search(grounded)
+    if not grounded.nodes[place].calls:
         ends = np.zeros_like(entry)
-        at = np.flatnonzero(entry)
-        ends[model.outcomes[at, place][model.probabilities[at, place] > 0]] = True
+        ends[search.after(entry, place)] = True
         return Course(entry, ends)
-    decided, ended = np.zeros_like(entry), np.zeros_like(entry)
-    new = entry & node.live
-    while new.any():
-        decided |= new
-        after = np.zeros_like(entry)
-        for call in node.calls:
-            made = new & call.available
-            if made.any():
-                after |= course(grounded, call.child, made).ends
-        ended |= after & node.terminal
-        new = after & node.live & ~decided
-    return Course(decided, ended)
+    run = _Run(np.zeros_like(entry), np.zeros_like(entry))
+    search.follow(place, entry, run)
+    return Course(run.decides, run.ends)
+
+
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What is known so far of one task on one path of calls, so that nothing is followed twice.
+
+    Parameters
+    ----------
+    decides, ends
+        As in `Course`.
+    below
+        The same for the tasks that it calls, by place.
+    """
+
+    decides: Mask
+    ends: Mask
+    below: dict[int, _Run] = field(default_factory=dict)
+
+
+class _Search:
+    """Follows tasks through a ground graph."""
+
+    def __init__(self, grounded: GroundGraph) -> None:
+        self.nodes = grounded.nodes
+        self.model = grounded.model
+        try:
+            self.occurs: Mask | None = grounded.model.probabilities > 0
+        except UserError:  # a black box shows none, but tells what may follow
+            self.occurs = None
+
+    def after(self, states: Mask, action: int) -> NDArray[np.int64]:
+        """Return the states that an action may lead to, maybe repeated."""
+        if self.occurs is None:
+            return self.model.following(states, action)
+        at = np.flatnonzero(states)
+        led: NDArray[np.int64] = self.model.outcomes[at, action][self.occurs[at, action]]
+        return led
+
+    def follow(self, place: int, entry: Mask, run: _Run) -> Mask:
+        """Follow a task from more entries; return the states in which it may end and was not known to."""
+        node, known = self.nodes[place], run.ends.copy()
+        new = entry & node.live & ~run.decides
+        while new.any():
+            run.decides[new] = True
+            after = np.zeros_like(entry)
+            for call in node.calls:
+                made = new & call.available
+                if not made.any():
+                    continue
+                if self.nodes[call.child].calls:
+                    below = run.below.setdefault(call.child, _Run(np.zeros_like(entry), np.zeros_like(entry)))
+                    after |= self.follow(call.child, made, below)
+                else:
+                    after[self.after(made, call.child)] = True
+            run.ends[after & node.terminal] = True
+            new = after & node.live & ~run.decides
+        return run.ends & ~known
 
 
 def scopes(grounded: GroundGraph) -> tuple[Scope, ...]:

@@ -46,7 +46,7 @@ class Call:
         """Return the call with its own relevant variables, fewer than the caller's (`uses` of an edge).
 
         Sound where the child's result does not depend on the rest (result-distribution irrelevance and
-        termination: Dietterich 2000, section 5.1).
+        termination: Dietterich 2000, sections 5.1.3 and 5.1.4).
         """
         return replace(self, relevant=tuple(variable.name for variable in variables))
 
@@ -163,7 +163,7 @@ class TaskGraph:
             Which of its terminations are good ones. Defaults to all.
         pseudo_reward
             What a learner is taught to expect of the other terminations (MAXQ-Q; Dietterich 2000,
-            section 3.3): below what finishing costs, lest the task learns to quit early.
+            sections 3.2 and 4.4): below what finishing costs, lest the task learns to quit early.
 
         Raises
         ------

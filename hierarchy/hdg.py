@@ -1,4 +1,4 @@
-"""The task graph of Kaelbling's landmark maze, after Dietterich (2000)."""
+"""The task graph of Kaelbling's landmark maze, after Dietterich (2000, section 7.2)."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ def hdg_graph(maze: LandmarkMaze, *, may_leave: bool = False) -> TaskGraph:
     goal inside its region. GotoLmk(landmark) works in the landmark's region and those beside it.
 
     What GotoGoalLmk stores of a completion after GotoLmk is one value for each pair of landmarks: where
-    GotoLmk lands is dropped. That is right as long as it always lands at its landmark.
+    GotoLmk lands is dropped. That is right as long as it always lands at its landmark. docs/hdg.md has the
+    published counts beside these, and every difference.
 
     Parameters
     ----------
@@ -28,7 +29,8 @@ def hdg_graph(maze: LandmarkMaze, *, may_leave: bool = False) -> TaskGraph:
         The maze.
     may_leave
         False: GotoLmk and GotoGoal cannot leave their working spaces; a move that might is not available.
-        True: they end where they leave, as with moves that slip they must; ending so is no goal of theirs.
+        True, as published: they end where they leave, as with moves that slip they must; ending so is no
+        goal of theirs.
 
     Examples
     --------

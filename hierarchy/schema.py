@@ -31,11 +31,14 @@ _WORDS: Final = {  # pydantic's kinds of error in ours: the problem, and a mend
     "float_type": ("it is no number", "write one, such as -10"),
     "finite_number": ("it is no finite number", "write one, such as -10"),
     "too_short": ("it is empty", "give at least one"),
+    "string_too_short": ("it is empty", "write something there"),
 }
 
 Label = Annotated[str, WithJsonSchema(_SCALAR)]
 """A value by its label. Text that looks like a number or a truth value is a label all the same."""
-PredicateText = Annotated[str, Field(description="A predicate, such as: doors = open and robot in room A")]
+PredicateText = Annotated[
+    str, Field(description="A predicate, such as: doors = open and robot in room A", min_length=1)
+]
 Pairs = tuple[tuple[str, str], ...]
 
 
@@ -148,7 +151,7 @@ class TaskText(_Model):
 class GraphText(_Model):
     """A task graph of affordant. The task that stands last is the root."""
 
-    graph: Annotated[str, Field(description="The graph's name")]
+    graph: Annotated[str, Field(description="The graph's name", min_length=1)]
     world: Annotated[str | None, Field(description="The world's name, or the path of a .maze file")] = None
     sets: Annotated[
         dict[str, ValuesText], Field(description="Sets of values that predicates name, besides the world's")
@@ -195,6 +198,8 @@ def _fault(document: Document, error: dict[str, Any]) -> Fault:
     elif kind == "dict_type" and len(path) == 5 and path[2] == "do":  # a binding, or a key gone wrong
         problem = f"{last!r} is given {error['input']!r}, which binds no parameters"
         mend = suggest(last, ("when", "uses"), "keys besides the child:")
+        if last in document.data["tasks"]:
+            mend = f"write - {last}: {{PARAMETER: VALUE}}"
     else:
         problem, mend = _WORDS.get(kind, (error["msg"], "mend it"))
     return document.fault(path, problem, mend)

@@ -12,7 +12,7 @@ def taxi_graph(model: TransitionModel) -> TaskGraph:
     """Return Root -> Get, Put -> Navigate(site), Pickup, Putdown -> North, South, East, West.
 
     Get works while the passenger waits at a site and ends with him aboard; Put works while he is aboard
-    and ends with him delivered. Relevant variables are Dietterich's (section 5.3): a completion after
+    and ends with him delivered. Relevant variables are Dietterich's (section 5.1.6): a completion after
     Navigate does not depend on where the taxi was, since Navigate ends at its site.
 
     Parameters

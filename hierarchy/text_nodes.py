@@ -9,12 +9,33 @@ from typing import Any, Final
 import yaml
 
 from hierarchy.graph import TaskGraphError
+from hierarchy.text_words import shortened
 
 Path = tuple[str | int, ...]
 """Keys and places in lists that lead to a part of a document."""
 LARGEST: Final = 1_000_000
 """Characters that a document may have."""
 _DEEPEST: Final = 20  # the format itself needs 7
+_TOLD: Final = 12  # mistakes that a message lists
+_LONGEST: Final = 300  # characters of what a message quotes
+_YAML_WORDS: Final = {  # a piece of the YAML reader's problem in our words: the problem, and a mend
+    r"'\t'": ("a tab cannot indent", "indent with blanks"),
+    "mapping values are not allowed": (
+        "a ': ' cannot stand here",
+        "put the value in quotes, or mend the indentation",
+    ),
+    "found another document": ("a second document begins here", "keep one"),
+    "found '<block mapping start>'": (
+        "it is indented otherwise than the lines before",
+        "mend the indentation",
+    ),
+    "but found '?'": (
+        "keys stand here beside the items of a list",
+        "write keys alone, or a '- ' before each",
+    ),
+    "could not find expected ':'": ("a ':' is missing after a key", "write KEY: VALUE"),
+    "unexpected end of stream": ("the text ends too early", "close its quotes and brackets"),
+}
 
 
 @dataclass(frozen=True, order=True)
@@ -44,7 +65,9 @@ class TaskGraphTextError(TaskGraphError):
     def __init__(self, source: str, faults: Iterable[Fault]) -> None:
         self.source = source
         self.faults = tuple(sorted(faults))
-        super().__init__("\n".join(f"{source}, {fault}" for fault in self.faults))
+        lines = [f"{source}, {fault}" for fault in self.faults[:_TOLD]]
+        more = len(self.faults) - len(lines)
+        super().__init__("\n".join([*lines, f"and {more} more in {source}"] if more else lines))
 
 
 @dataclass(frozen=True)
@@ -59,7 +82,8 @@ class Document:
         known = path
         while known not in self.lines:
             known = known[:-1]
-        return Fault(self.lines[known], path_text(path), problem, mend)
+        words = (path_text(path), problem, mend)
+        return Fault(self.lines[known], *(shortened(each, _LONGEST) for each in words))
 
 
 def path_text(path: Path) -> str:
@@ -96,13 +120,12 @@ def read_yaml(text: str, source: str) -> Document:
         _refuse_specials(text, source)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:
-        mark = error.problem_mark or error.context_mark
-        line = mark.line + 1 if mark else 1
-        column = f" at column {mark.column + 1}" if mark else ""
-        raise _refused(source, line, f"this is no YAML{column}: {error.problem}", "mend it there") from None
-    except yaml.YAMLError as error:
-        raise _refused(source, 1, f"this is no YAML: {error}", "remove such characters") from None
-    if node is None:
+        raise _refused(source, *_told(error)) from None
+    except yaml.reader.ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        problem = f"the character U+{error.character:04X} cannot stand in a text"
+        raise _refused(source, line, problem, "remove it") from None
+    if node is None or (isinstance(node, yaml.ScalarNode) and not node.value):
         raise _refused(source, 1, "the text is empty", "begin it with 'graph: NAME'")
     reader = _Reader(source)
     data = reader.read(node, ())
@@ -124,6 +147,17 @@ def _refuse_specials(text: str, source: str) -> None:
             raise _refused(source, line, f"it is nested more than {_DEEPEST} deep", "write it flatter")
 
 
+def _told(error: yaml.MarkedYAMLError) -> tuple[int, str, str]:
+    """Return the line, the problem and a mend of what is no YAML."""
+    mark = error.problem_mark or error.context_mark
+    problem, mend = next((words for piece, words in _YAML_WORDS.items() if piece in error.problem), ("", ""))
+    problem = problem or shortened(error.problem, _LONGEST)
+    began = error.context_mark.line + 1 if error.context_mark else mark.line + 1
+    since = f", in what begins in line {began}" if began != mark.line + 1 else ""
+    where = f"this is no YAML at column {mark.column + 1}{since}"
+    return mark.line + 1, f"{where}: {problem}", mend or "mend it there"
+
+
 def _refused(source: str, line: int, problem: str, mend: str) -> TaskGraphTextError:
     return TaskGraphTextError(source, [Fault(line, "", problem, mend)])
 
@@ -139,7 +173,7 @@ class _Reader:
     def read(self, node: yaml.Node, path: Path) -> Any:
         self.lines.setdefault(path, node.start_mark.line + 1)
         if isinstance(node, yaml.ScalarNode):
-            return node.value
+            return self.scalar(node, path)
         if isinstance(node, yaml.SequenceNode):
             return [self.read(item, (*path, place)) for place, item in enumerate(node.value)]
         data: dict[str, Any] = {}
@@ -148,7 +182,7 @@ class _Reader:
             if not isinstance(key, yaml.ScalarNode):
                 self.faults.append(Fault(line, path_text(path), "a key is no word", "write a plain key"))
                 continue
-            here = (*path, key.value)
+            here = (*path, self.scalar(key, path))
             if key.value in data:
                 first = self.lines[here]
                 problem = f"the key {key.value!r} is given again; it stands in line {first} already"
@@ -157,3 +191,14 @@ class _Reader:
             self.lines[here] = line
             data[key.value] = self.read(value, here)
         return data
+
+    def scalar(self, node: yaml.ScalarNode, path: Path) -> str:
+        """Return a scalar as it is written; half of a pair of escapes is no character."""
+        text = str(node.value)
+        if any("\ud800" <= each <= "\udfff" for each in text):
+            problem = "an escape stands for half a character"
+            self.faults.append(
+                Fault(node.start_mark.line + 1, path_text(path), problem, "write the character")
+            )
+            return text.encode(errors="replace").decode()
+        return text

@@ -25,7 +25,7 @@ from typing import Any, Final, NoReturn, cast
 
 from hierarchy.predicates import AllOf, AnyOf, Implies, Not, Predicate
 from hierarchy.terms import Constant, Equal, Member, Ordered, Relation, Term
-from hierarchy.text_words import KEYWORDS, PredicateError, Scope, Token, literal, tokens
+from hierarchy.text_words import KEYWORDS, PredicateError, Scope, Token, literal, misread, tokens
 from worlds import Variable, suggest
 
 _RELATIONS: Final = ("=", "!=", "<", "<=", ">", ">=")
@@ -57,7 +57,8 @@ def parse_predicate(text: str, scope: Scope) -> Predicate:
     except RecursionError:
         raise PredicateError(text, 1, "it is nested too deeply", "write it flatter") from None
     if parser.token.kind != "end":
-        parser.fail(f"'and', 'or' or the end is missing before {parser.token.text!r}", "mend it there")
+        mend = misread(parser.token.text) or "mend it there"
+        parser.fail(f"'and', 'or' or the end is missing before {parser.token.text!r}", mend)
     return predicate
 
 
@@ -179,7 +180,8 @@ class _Parser:
             if named.text not in self.scope.sets:
                 problem = f"unknown set of values {named.text!r}"
                 known = named.text in term.domain.labels
-                mend = f"write {{{named.text}}}" if known else suggest(named.text, self.scope.sets, "sets:")
+                near = misread(named.text) or suggest(named.text, self.scope.sets, "sets:")
+                mend = f"write {{{named.text}}}" if known else near
                 self.fail(problem, mend, column)
             values = self.scope.sets[named.text]
             if foreign := [value for value in values.values if value not in term.domain]:
@@ -210,7 +212,9 @@ class _Parser:
             words.append(self.token.text)
             self.at += 1
         if not words:
-            self.fail(f"a name or value is missing before {first.text!r}", "write one there")
+            doubled = first.text == self.tokens[self.at - 1].text == "="
+            mend = "write '=' once" if doubled else "write one there"
+            self.fail(f"a name or value is missing before {first.text!r}", mend)
         return Token("phrase", " ".join(words), first.column)
 
     def term(self, side: Token) -> Term | None:
@@ -220,7 +224,7 @@ class _Parser:
 
     def known_term(self, side: Token) -> Term:
         if side.kind == "value" or side.text not in self.scope.terms:
-            mend = suggest(side.text, self.scope.terms, "names:")
+            mend = misread(side.text) or suggest(side.text, self.scope.terms, "names:")
             self.fail(f"unknown name {side.text!r}", mend, side.column)
         return self.scope.terms[side.text]
 
@@ -236,7 +240,7 @@ class _Parser:
         if len(parts) > 1 and set(parts) <= set(domain.labels):
             mend = f"separate values by a comma and a blank: {', '.join(parts)}"
         else:
-            mend = suggest(side.text, (*domain.labels, *self.scope.terms), "there are:")
+            mend = misread(side.text) or suggest(side.text, (*domain.labels, *self.scope.terms), "there are:")
         self.fail(f"unknown value {side.text!r} of {domain.name}", mend, side.column)
 
 

@@ -11,12 +11,13 @@ from hierarchy.graph import Call, TaskGraph, TaskGraphError
 from hierarchy.predicates import ALWAYS, Predicate
 from hierarchy.schema import CallText, TaskText, ValuesText, validated
 from hierarchy.terms import Constant, Param, Term, ValueSet, Var
+from hierarchy.text_files import file_text
 from hierarchy.text_nodes import Document, Fault, TaskGraphTextError, read_yaml
 from hierarchy.text_nodes import Path as KeyPath
 from hierarchy.text_predicates import parse_predicate, parse_side
 from hierarchy.text_words import PredicateError, Scope, literal
-from hierarchy.text_worlds import MAZE_SUFFIX, TextWorld, load_world, maze_world
-from worlds import UserError, Variable, load_layout, suggest
+from hierarchy.text_worlds import MAZE_SUFFIX, TextWorld, load_world, maze_file
+from worlds import UserError, Variable, suggest
 
 _SUFFIX: Final = ".yaml"
 RESERVED: Final = ("when", "uses")
@@ -69,15 +70,11 @@ def load_graph(name: str | Path, world: TextWorld | None = None) -> LoadedGraph:
     if isinstance(name, str) and name in graph_names():
         text = files("hierarchy").joinpath("graphs", name + _SUFFIX).read_text(encoding="utf-8")
         return parse_graph(text, name + _SUFFIX, world)
+    missing = (
+        f"no task graph of this name and no such file; {suggest(str(name), graph_names(), 'graphs by name:')}"
+    )
     path = Path(name)
-    if not path.is_file():
-        mend = suggest(str(name), graph_names(), "graphs by name:")
-        raise UserError(f"{name}: no task graph of this name and no such file; {mend}")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise UserError(f"{path}: cannot be read as UTF-8 text ({error}); check the file") from error
-    return parse_graph(text, str(path), world, folder=path.parent)
+    return parse_graph(file_text(path, missing), str(path), world, folder=path.parent)
 
 
 def parse_graph(
@@ -143,7 +140,7 @@ def _world(name: str | None, folder: Path) -> TextWorld:
     if name is None:
         raise UserError("the text names no world, and none is given; add world: NAME")
     if name.endswith(MAZE_SUFFIX):
-        return maze_world(load_layout(folder / name), name)
+        return maze_file(folder / name, name)
     return load_world(name)
 
 
@@ -157,6 +154,7 @@ class _Builder:
         self.variables: dict[str, Var] = {variable.name: Var(variable) for variable in world.variables}
         self.sets = {values.name: values for values in world.sets}
         self.params: dict[str, tuple[Param, ...]] = {}
+        self.unsure: set[str] = set()  # tasks with a faulty parameter: what is said of it is no second fault
 
     def fail(self, path: KeyPath, problem: str, mend: str) -> None:
         self.faults.append(self.document.fault(path, problem, mend))
@@ -185,6 +183,8 @@ class _Builder:
                     self.fail(path, problem, mend)
                 else:
                     params.append(Param(domain))
+        if len(params) < len(form.params):
+            self.unsure.add(task)
         return params
 
     def values(self, form: ValuesText, path: KeyPath) -> list[tuple[str, Hashable]]:
@@ -234,25 +234,33 @@ class _Builder:
             if name not in self.variables:
                 mend = suggest(name, self.variables, "state variables:")
                 self.fail((*path, place), f"unknown state variable {name!r}", mend)
+            elif name in names[:place]:
+                self.fail((*path, place), f"{name!r} is given twice", "remove one of the two")
         return [self.variables[name] for name in names if name in self.variables]
 
     def predicate(self, text: str, scope: Scope, path: KeyPath) -> Predicate:
         try:
             return parse_predicate(text, scope)
         except PredicateError as error:
-            self.fail(path, error.problem, error.mend)
+            if path[1] not in self.unsure:
+                self.fail(path, error.problem, error.mend)
             return ALWAYS
 
     def call(self, form: CallText, scope: Scope, path: KeyPath) -> Call:
         child = form.child
         if child not in self.params and child not in self.world.actions:
+            bare = child.split("(")[0].strip()
             mend = suggest(child, (*self.params, *self.world.actions), "tasks and actions:")
+            if bare != child and bare in self.params:
+                mend = f"write - {bare}: {{PARAMETER: VALUE}}"
             self.fail((*path, child), f"unknown task or action {child!r}", mend)
             return Call(child)
         params = {param.name: param for param in self.params.get(child, ())}
         binding: list[tuple[str, Term | Constant]] = []
         for name, text in form.binding.items():
             here = (*path, child, name)
+            if name not in params and child in self.unsure:
+                continue
             if name not in params:
                 mend = suggest(name, params, f"parameters of {child}:")
                 self.fail(here, f"unknown parameter {name!r} of {child}", mend)
@@ -260,7 +268,8 @@ class _Builder:
             try:
                 binding.append((name, parse_side(text, scope, params[name].domain)))
             except PredicateError as error:
-                self.fail(here, error.problem, error.mend)
+                if path[1] not in self.unsure:
+                    self.fail(here, error.problem, error.mend)
         relevant = None
         if form.uses is not None:
             relevant = tuple(var.name for var in self.known(form.uses, (*path, "uses")))

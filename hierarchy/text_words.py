@@ -17,17 +17,38 @@ _TOKEN: Final = re.compile(
     r"""|(?P<word>[^\s(){}"`=<>!]+)|(?P<wrong>\S)""",
     re.DOTALL,
 )
+_QUOTED: Final = 90  # characters of a predicate that a message quotes
 KEYWORDS: Final = frozenset({"and", "or", "not", "in", "implies", "always", "never"})
+_FOREIGN: Final = {"&&": "and", "&": "and", "||": "or", "|": "or", "->": "implies", "=>": "implies"}
 
 
 class PredicateError(TaskGraphError):
     """A predicate's text is wrong; `column` counts from 1 in `text`."""
 
     def __init__(self, text: str, column: int, problem: str, mend: str) -> None:
-        self.problem = f"column {column} of {' '.join(text.split())!r}: {problem}"
+        self.problem = f"column {column} of {_around(text, column)!r}: {problem}"
         self.mend = mend
         self.column = column
         super().__init__(f"{self.problem}; {mend}")
+
+
+def _around(text: str, column: int) -> str:
+    """Return a text, or what stands around a column of a long one."""
+    if len(text) > _QUOTED:
+        first = min(max(0, column - 1 - _QUOTED // 2), len(text) - _QUOTED)
+        last = first + _QUOTED
+        text = ("..." if first else "") + text[first:last] + ("..." if last < len(text) else "")
+    return " ".join(text.split())
+
+
+def shortened(text: str, most: int) -> str:
+    """Return a text, its middle left out where it is longer than `most` characters.
+
+    >>> shortened("abcdefghijklmnop", 9), shortened("abc", 9)
+    ('abc...nop', 'abc')
+    """
+    half = (most - 3) // 2
+    return text if len(text) <= most else f"{text[:half]}...{text[-half:]}"
 
 
 @dataclass(frozen=True)
@@ -79,6 +100,19 @@ def literal(text: str) -> Hashable:
     except (ValueError, SyntaxError, TypeError, MemoryError, RecursionError):
         return text
     return cast("Hashable", value)
+
+
+def misread(words: str) -> str:
+    """Return a mend for words that hold a connective of other languages, or one in capitals.
+
+    >>> misread("open && robot"), misread("open AND robot"), misread("room A")
+    ("write 'and' for '&&'", "write 'and' for 'AND'", '')
+    """
+    for word in words.split(" "):
+        meant = _FOREIGN.get(word, word.lower())
+        if meant in KEYWORDS and word != meant:
+            return f"write {meant!r} for {word!r}"
+    return ""
 
 
 def bare_or(text: str, quoted: Callable[[str], str]) -> str:

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from difflib import get_close_matches
+from functools import partial
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
 from typing import Final
 
 from hierarchy.terms import ValueSet
@@ -25,18 +26,24 @@ from worlds import (
     load_layout,
     maze_model,
     maze_variables,
+    suggest,
 )
+from worlds.hdg import LandmarkMaze, landmark_model, landmark_variables
 from worlds.taxi import SITES, TAXI_ACTIONS, taxi_model, taxi_variables
 
 GROUP: Final = "affordant.worlds"
 """The entry points' group."""
 MAZE_SUFFIX: Final = ".maze"
 """How the name of a maze's file ends."""
-# Ours are entry points as well, so that naming a world loads what it needs and no more.
-_OURS: Final = (
-    EntryPoint("two_rooms", "hierarchy.text_worlds:_two_rooms", GROUP),
-    EntryPoint("taxi", "hierarchy.text_worlds:_taxi", GROUP),
-)
+GYM_PREFIX: Final = "gym:"
+"""How the name of a Gymnasium environment begins."""
+_TAXIS: Final = {  # rain and fickle: Dietterich (2000), section 7.1
+    "taxi": (0.0, 0.0),
+    "taxi-rainy": (0.2, 0.0),
+    "taxi-fickle": (0.0, 0.3),
+    "taxi-rainy-fickle": (0.2, 0.3),
+}
+_HDGS: Final = {"hdg": 0.0, "hdg-slippery": 0.2}
 
 
 @dataclass(frozen=True)
@@ -93,23 +100,25 @@ def maze_world(layout: Layout, name: str | None = None) -> TextWorld:
 
 
 def world_names() -> tuple[str, ...]:
-    """Return the names of the worlds there are, ours first; any ``.maze`` file is a world besides.
+    """Return the names of the worlds there are, ours first.
+
+    Any ``.maze`` file is a world besides, and so is any Gymnasium environment that exposes its model.
 
     Examples
     --------
-    >>> "two_rooms" in world_names()
-    True
+    >>> world_names()[:3]
+    ('two_rooms', 'taxi', 'taxi-rainy')
     """
-    return tuple(_found())
+    return (*_ours(), *_others())
 
 
 def load_world(name: str) -> TextWorld:
-    """Return the world called `name`, or the maze of a ``.maze`` file.
+    """Return the world called `name`, the maze of a ``.maze`` file, or an environment: ``gym:Taxi-v4``.
 
     Raises
     ------
     UserError
-        If there is no such world or file, or it cannot be loaded.
+        If there is no such world, file or environment, or it cannot be loaded.
 
     Examples
     --------
@@ -121,34 +130,81 @@ def load_world(name: str) -> TextWorld:
     worlds.errors.UserError: no world 'two_room'; did you mean 'two_rooms'?
     """
     if name.endswith(MAZE_SUFFIX):
-        return maze_world(load_layout(name), name)
-    found = _found()
-    if name not in found:
-        near = get_close_matches(name, found, n=1)
-        known = f"there are {', '.join(found)}, and any {MAZE_SUFFIX} file by its path"
-        raise UserError(f"no world {name!r}; {f'did you mean {near[0]!r}?' if near else known}")
-    point = found[name]
+        return maze_file(Path(name), name)
+    if name.startswith(GYM_PREFIX):
+        # Reached by its entry point, so that no other world loads Gymnasium.
+        return _called(EntryPoint(name, "hierarchy.text_gym:gym_world", GROUP), name)
+    ours, others = _ours(), _others()
+    if name in ours:
+        return ours[name]()
+    if name not in others:
+        known = f"name a {MAZE_SUFFIX} file, {GYM_PREFIX}ID, or one of"
+        raise UserError(f"no world {name!r}; {suggest(name, (*ours, *others), known)}")
+    return _called(others[name])
+
+
+def maze_file(path: Path, name: str) -> TextWorld:
+    """Return the world of a maze's file, called `name`.
+
+    Raises
+    ------
+    UserError
+        If there is no such file, or it is wrong.
+    """
     try:
-        make: Callable[[], TextWorld] = point.load()
+        return maze_world(load_layout(path), name)
+    except OSError as error:
+        raise UserError(f"{name}: it cannot be read ({error.strerror}); check the path") from error
+
+
+def site_sets(variables: tuple[Variable, ...]) -> tuple[ValueSet, ...]:
+    """Return Taxi's named set, if these are Taxi's variables: the sites.
+
+    >>> [str(values) for values in site_sets(taxi_variables())], site_sets((Variable("x", (0,)),))
+    (['sites'], ())
+    """
+    sites = ValueSet("sites", frozenset(SITES.values()))
+    taxi = any(variable == taxi_variables()[1] for variable in variables)
+    return (sites,) if taxi else ()
+
+
+def _called(point: EntryPoint, *arguments: str) -> TextWorld:
+    """Return what an entry point's function gives."""
+    try:
+        make: Callable[..., TextWorld] = point.load()
     except (ImportError, AttributeError) as error:
         raise UserError(
-            f"world {name!r} ({point.value}) cannot be loaded: {error}; "
+            f"world {point.name!r} ({point.value}) cannot be loaded: {error}; "
             "install what it needs, or mend its entry point"
         ) from error
-    return make()
+    return make(*arguments)
 
 
-def _found() -> dict[str, EntryPoint]:
-    """Return entry points by name; a name of ours cannot be taken by another package."""
-    others = {point.name: point for point in sorted(entry_points(group=GROUP), key=lambda p: p.name)}
-    ours = {point.name: point for point in _OURS}
-    return ours | {name: point for name, point in others.items() if name not in ours}
+def _ours() -> dict[str, Callable[[], TextWorld]]:
+    return {
+        "two_rooms": lambda: maze_world(load_layout("two_rooms")),
+        **{name: partial(_taxi, name) for name in _TAXIS},
+        **{name: partial(_hdg, name) for name in _HDGS},
+    }
 
 
-def _two_rooms() -> TextWorld:
-    return maze_world(load_layout("two_rooms"))
+def _others() -> dict[str, EntryPoint]:
+    """Return other packages' entry points by name; a name of ours cannot be taken."""
+    points = sorted(entry_points(group=GROUP), key=lambda point: point.name)
+    return {point.name: point for point in points if point.name not in _ours()}
 
 
-def _taxi() -> TextWorld:
-    sites = ValueSet("sites", frozenset(SITES.values()))
-    return TextWorld("taxi", taxi_variables(), TAXI_ACTIONS, taxi_model, (sites,))
+def _taxi(name: str) -> TextWorld:
+    rain, fickle = _TAXIS[name]
+    variables = taxi_variables(fickle=fickle > 0)
+    model = partial(taxi_model, rain=rain, fickle=fickle)
+    return TextWorld(name, variables, TAXI_ACTIONS, model, site_sets(variables))
+
+
+def _hdg(name: str) -> TextWorld:
+    maze = LandmarkMaze()
+    named = {"region": maze.regions, "around": maze.around}
+    sets = tuple(ValueSet(f"{word} {lmk}", cells) for word, by in named.items() for lmk, cells in by.items())
+    return TextWorld(
+        name, landmark_variables(maze), ACTIONS, partial(landmark_model, maze, slip=_HDGS[name]), sets
+    )

@@ -10,13 +10,12 @@ factory: a callable that takes the `worlds.camera.Camera` and returns a `Backend
 from __future__ import annotations
 
 from collections.abc import Callable
-from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from typing import Final
 
 from perception.protocol import Backend
 from perception.truth import Truth
-from worlds import UserError
+from worlds import UserError, suggest
 from worlds.camera import Camera
 
 GROUP: Final = "affordant.perception"
@@ -64,13 +63,11 @@ def load_backend(name: str, camera: Camera | None = None) -> Backend:
     >>> load_backend("huogh")
     Traceback (most recent call last):
         ...
-    worlds.errors.UserError: no perception backend 'huogh'; did you mean 'hough'? Backends: truth, hough
+    worlds.errors.UserError: no perception backend 'huogh'; did you mean 'hough'?
     """
     found = _found()
     if name not in found:
-        near = get_close_matches(name, found, n=1)
-        hint = f"did you mean {near[0]!r}? " if near else ""
-        raise UserError(f"no perception backend {name!r}; {hint}Backends: {', '.join(found)}")
+        raise UserError(f"no perception backend {name!r}; {suggest(name, found, 'backends:')}")
     return _load(found[name])(Camera() if camera is None else camera)
 
 

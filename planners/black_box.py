@@ -9,7 +9,8 @@ from typing import Final
 
 import numpy as np
 
-from hierarchy import ALWAYS, GroundGraph, Leaf, TaskGraph, TaskGraphError, check, ground
+from hierarchy import ALWAYS, GroundGraph, Leaf, TaskGraph, TaskGraphError
+from hierarchy.check import examine
 from planners.learner import Settings, Trace
 from planners.maxq import MaxQ
 from worlds import Stream, UserError
@@ -54,11 +55,11 @@ def ground_black_box(graph: TaskGraph, box: BlackBox) -> GroundGraph:
                 "use guards (when) and an initiation (start) instead"
             )
     model = UnknownModel(box.index, box.actions)
-    findings = [finding for finding in check(graph, model) if finding.kind not in _POSSIBLE]
-    if findings:
+    found, grounded = examine(graph, model)
+    findings = [finding for finding in found if finding.kind not in _POSSIBLE]
+    if findings or grounded is None:
         listed = "\n".join(f"  {finding}" for finding in findings)
         raise TaskGraphError(f"task graph {graph.name} cannot run:\n{listed}")
-    grounded = ground(graph, model)
     leaf = Leaf(np.arange(box.index.size, dtype=np.int64), box.index.size)
     nodes = tuple(node if node.calls else replace(node, leaf=leaf) for node in grounded.nodes)
     return GroundGraph(graph, model, nodes)

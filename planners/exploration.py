@@ -89,9 +89,10 @@ class Exploration:
 class Boltzmann:
     """Choices in proportion to exp(value / temperature), where the temperature falls geometrically.
 
-    It is start * factor**n in episode n, and never below `least`. Dietterich (2000, section 7) cools each
-    task at a rate of its own, subtasks faster than their callers. A geometric fall is not GLIE: that takes a
-    temperature that falls as slowly as 1 / log n (Singh et al., 2000). Cool slowly enough.
+    It is start * factor**n in episode n, and never below `least`. Dietterich (2000, section 7.1) cools each
+    task at a rate of its own, each time that it ends in its goal; here every episode counts. A geometric fall
+    is not GLIE: that takes a temperature that falls as slowly as 1 / log n (Singh et al., 2000). Cool slowly
+    enough.
 
     Examples
     --------

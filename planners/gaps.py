@@ -18,7 +18,7 @@ from scipy.sparse.linalg import splu
 from hierarchy import GroundGraph
 from hierarchy.exits import chain, surely_ends
 from planners.recursive import Solution, recursive_optimum
-from planners.smdp import TIE, Optimum
+from planners.smdp import TIE, Mask, Optimum
 from planners.stack import StackProblem, StackSolution, flat_optimum, hierarchical_optimum
 
 Degree = Literal["hierarchical", "global"]
@@ -65,7 +65,7 @@ def gap(grounded: GroundGraph, solution: Solution) -> Gap:
 
 @dataclass(frozen=True)
 class Shortfall:
-    """A start state from which the recursively optimal policy falls short: a counter-example.
+    """A state from which the recursively optimal policy falls short: a counter-example.
 
     Parameters
     ----------
@@ -113,21 +113,24 @@ class Shortfall:
 
 @dataclass(frozen=True, eq=False)
 class GapReport:
-    """Every start state that falls short, smallest counter-example first.
+    """Every state looked at that falls short, smallest counter-example first.
 
     Parameters
     ----------
     grounded
         The ground graph.
     starts
-        Number of start states.
+        Number of states looked at: start states, unless others were asked for.
     shortfalls
-        Those that fall short, by expected steps, then by number.
+        All of those that fall short, by expected steps, then by number.
+    among
+        What was looked at: "start states", or "states" that were asked for.
     """
 
     grounded: GroundGraph
     starts: int
     shortfalls: tuple[Shortfall, ...]
+    among: str = "start states"
 
     @property
     def by_task(self) -> dict[str, tuple[int, float]]:
@@ -142,17 +145,22 @@ class GapReport:
         return "\n".join(self._lines())
 
     def _lines(self) -> Iterator[str]:
-        yield f"{len(self.shortfalls)} of {self.starts} start states fall short of the global optimum"
+        yield f"{len(self.shortfalls)} of {self.starts} {self.among} fall short of the global optimum"
         for task, (count, lost) in self.by_task.items():
             yield f"{task} is responsible in {count}, which lose {lost:g} in all"
         if self.shortfalls:
-            one = self.shortfalls[0]
-            upper = f"{one.hierarchical:g} hierarchically, {one.best:g} globally"
-            yield f"smallest: from {self.describe(one.start)}"
-            yield f"  {one.recursive:g} recursively, {upper}"
-            yield f"in {self.describe(one.state)}"
-            better = f"the {one.short_of} optimum {one.better}"
-            yield f"  {one.task} chooses {one.chosen}, {better}: that costs {one.cost:g} of {one.lost:g}"
+            yield f"smallest: {self.explain(self.shortfalls[0])}"
+
+    def explain(self, one: Shortfall) -> str:
+        """Return one of the shortfalls in words, on four lines."""
+        upper = f"{one.hierarchical:g} hierarchically, {one.best:g} globally"
+        better = f"the {one.short_of} optimum {one.better}"
+        return (
+            f"from {self.describe(one.start)}\n"
+            f"  {one.recursive:g} recursively, {upper}\n"
+            f"in {self.describe(one.state)}\n"
+            f"  {one.task} chooses {one.chosen}, {better}: that costs {one.cost:g} of {one.lost:g}"
+        )
 
     def describe(self, state: int) -> str:
         """Return a state in words."""
@@ -161,12 +169,21 @@ class GapReport:
         return ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in pairs)
 
 
-def gap_report(grounded: GroundGraph, gamma: float = 1.0) -> GapReport:
-    """Solve a ground graph to all three degrees and explain each start state that falls short.
+def gap_report(grounded: GroundGraph, gamma: float = 1.0, states: Mask | None = None) -> GapReport:
+    """Solve a ground graph to all three degrees and explain each state that falls short.
 
     Losses are told apart exactly. A choice loses what the next degree's value drops by when it is made; over
     all paths of a policy these drops add up to what the policy loses (Kakade and Langford, 2002, lemma 6.1),
     so that each task's share is known.
+
+    Parameters
+    ----------
+    grounded
+        The ground graph.
+    gamma
+        Discount factor for one primitive step.
+    states
+        From which states to look, a mask of shape (states,); the start states unless given.
 
     Examples
     --------
@@ -184,11 +201,12 @@ def gap_report(grounded: GroundGraph, gamma: float = 1.0) -> GapReport:
     recursive, hierarchical = recursive_optimum(grounded, gamma), hierarchical_optimum(grounded, gamma)
     flat = flat_optimum(grounded.model, grounded.nodes[grounded.root].terminal, gamma)
     explained = _Explained(recursive, hierarchical, flat)
-    starts = np.flatnonzero(grounded.model.starts)
+    starts = np.flatnonzero(grounded.model.starts if states is None else states)
     lost = _lost(flat.value[starts], recursive.value[grounded.root, starts])
     found = [explained.shortfall(int(start)) for start in starts[lost > 0]]
     found.sort(key=lambda one: (one.steps, one.start))
-    return GapReport(grounded, starts.size, tuple(found))
+    among = "start states" if states is None else "states"
+    return GapReport(grounded, starts.size, tuple(found), among)
 
 
 class _Losses:

@@ -84,11 +84,11 @@ class HSMQ(Learner):
         ended = self._terminal[task][after]
         target = self._pseudo[task][after] if ended else self.value(task, after)
         targets = []
-        for _, reward in reversed(trace):
-            target = reward + self.settings.gamma * target
+        for step in reversed(trace):
+            target = step.reward + self.settings.gamma * target
             targets.append(target)
         targets.reverse()
         table = self.table[task][k]
         for at in self._updated(task, k, trace):
-            row = self._row[task][trace[at][0]]
+            row = self._row[task][trace[at].state]
             table[row] += rate * (targets[at] - table[row])

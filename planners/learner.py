@@ -10,17 +10,28 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import accumulate
-from typing import Final, TypeVar
+from typing import Final, NamedTuple
 
 from hierarchy import GroundGraph
 from planners.exploration import Exploration, Explorer, first_best
-from planners.schedules import LearningRate, Rate
-from worlds import Stream, TransitionModel, UserError, suggest
+from planners.schedules import LearningRate, Rate, by_task
+from worlds import Stream, TransitionModel, UserError
 
-Trace = list[tuple[int, float]]
-"""Each primitive step of a task: the state that it was taken in, and its reward."""
 
-T = TypeVar("T")
+class Step(NamedTuple):
+    """A primitive step of a task: the state that it was taken in, its reward, and `again`.
+
+    `again` says that the task, begun anew in that state, would have gone on as it did.
+    """
+
+    state: int
+    reward: float
+    again: bool = True
+
+
+Trace = list[Step]
+"""The primitive steps of a task, in one flat sequence whatever the depth."""
+
 _FIRST: Final[Sequence[int]] = (0,)  # the one step that a caller learns at without all-states updating
 
 _FOLLOWING = 0x466F_6C6C_6F77  # names the stream of greedy ways
@@ -46,8 +57,8 @@ class Settings:
     max_steps
         Primitive steps after which an episode of learning is given up with an error.
     all_states
-        Whether a task learns at every state that its child passed through, or at the first alone
-        (Dietterich 2000, section 4.3).
+        Whether a task learns at the first state of its child alone, or also at those that the child passed
+        through and would have gone on from in the same way (Dietterich 2000, section 4.3).
     rates, explorations
         Schedules of single tasks, by the name of a task or of a ground task, which comes first.
     """
@@ -97,13 +108,12 @@ class Learner(ABC):
         self._terminal: list[list[bool]] = [node.terminal.tolist() for node in nodes]
         self._children = [[call.child for call in node.calls] for node in nodes]
         self._available = [_choices(grounded, place) for place in range(len(nodes))]
-        self._rates = _by_task(grounded, self.settings.rate, self.settings.rates)
-        self._explorers = _by_task(grounded, self.settings.exploration, self.settings.explorations)
+        self._rates = by_task(grounded, self.settings.rate, self.settings.rates)
+        self._explorers = by_task(grounded, self.settings.exploration, self.settings.explorations)
         self.episodes = [0] * len(nodes)
         self.steps = 0
         self._limit = 0
-        self._random = Stream(*seed)
-        self._chance = Stream(*seed, _FOLLOWING)
+        self._random, self._chance = streams_of(seed)
 
     @abstractmethod
     def value(self, task: int, state: int) -> float:
@@ -170,7 +180,7 @@ class Learner(ABC):
             self.steps += 1
             if self.steps > self._limit:
                 raise EpisodeTooLongError(f"no end after {self.settings.max_steps} primitive steps")
-            return [(state, reward)], after
+            return [Step(state, reward)], after
         rate = self._rates[task](self.episodes[task])
         level = self._explorers[task](self.episodes[task])
         steps: Trace = []
@@ -178,21 +188,37 @@ class Learner(ABC):
             k = self._explore(task, state, level)
             trace, after = self._run(self._children[task][k], state, rate)
             self._learn(task, k, trace, after, rate)
-            steps += trace  # one flat sequence, whatever the depth
+            steps += self._seen_by_caller(task, k, trace)
             state = after
         self.episodes[task] += 1
         return steps, state
 
+    def _seen_by_caller(self, task: int, k: int, trace: Trace) -> Trace:
+        """Return the steps of a task's k-th child as steps of the task.
+
+        On the way of a child that is itself a task, the task may have had no say for a while: begun anew
+        there, it would be free to call another child. What it would then have been worth, this way does not
+        tell.
+        """
+        if not self.settings.all_states or len(trace) == 1 or task == self.grounded.root:
+            return trace  # nothing learns from the root's steps
+        free = self._available[task]
+
+        def freely(step: Step) -> bool:
+            return step.again and k in free[step.state] and self.greedy(task, step.state) == k
+
+        return [trace[0], *(step._replace(again=freely(step)) for step in trace[1:])]
+
     def _updated(self, task: int, k: int, trace: Trace) -> Sequence[int]:
         """Return which of a child's steps its caller learns at, the last first.
 
-        In all-states updating these are all whose state the child may be called in, for from there the
-        child would have gone on as it did (Dietterich 2000, section 4.3).
+        In all-states updating these are all whose state the child may be called in, and from where it would
+        have gone on as it did (Dietterich 2000, section 4.3).
         """
         if not self.settings.all_states:
             return _FIRST
-        states = range(len(trace) - 1, 0, -1)
-        return (*(at for at in states if k in self._available[task][trace[at][0]]), 0)
+        steps = range(len(trace) - 1, 0, -1)
+        return (*(at for at in steps if trace[at].again and k in self._available[task][trace[at].state]), 0)
 
     def _explore(self, task: int, state: int, level: float) -> int:
         """Choose a child by the task's way to explore."""
@@ -263,6 +289,16 @@ class Learner(ABC):
         return None if route is None else len(route)
 
 
+def streams_of(seed: Sequence[int]) -> tuple[Stream, Stream]:
+    """Return the streams that a seed names: a learner's own, and that of greedy ways.
+
+    >>> learning, following = streams_of((3, 1))
+    >>> learning.uniform() == following.uniform()
+    False
+    """
+    return Stream(*seed), Stream(*seed, _FOLLOWING)
+
+
 def pseudo_rewards(grounded: GroundGraph) -> list[list[float]]:
     """Return each node's pseudo-reward of ending in each state, shape (nodes, states).
 
@@ -273,17 +309,6 @@ def pseudo_rewards(grounded: GroundGraph) -> list[list[float]]:
         short = node.terminal & ~node.goal
         tables.append((short * (node.pseudo_reward or 0.0)).tolist())
     return tables
-
-
-def _by_task(grounded: GroundGraph, default: T, named: Mapping[str, T]) -> list[T]:
-    """Return one setting a node: the ground task's own, its task's, or the default."""
-    tasks = [node for node in grounded.nodes if node.calls]
-    known = sorted({node.name for node in tasks} | {node.task for node in tasks})
-    for name in named:
-        if name not in known:
-            mend = suggest(name, known, "there are")
-            raise UserError(f"settings name {name!r}, which is no task of {grounded.graph.name}; {mend}")
-    return [named.get(node.name, named.get(node.task, default)) for node in grounded.nodes]
 
 
 def _choices(grounded: GroundGraph, place: int) -> list[tuple[int, ...]]:

@@ -88,6 +88,6 @@ class MaxQ(Learner):
         completion, rows = self.completion[task][k], self._row[task][k]
         ahead = self.value(task, after)
         for at in self._updated(task, k, trace):
-            row = rows[trace[at][0]]
+            row = rows[trace[at].state]
             target = self.settings.gamma ** (len(trace) - at) * ahead
             completion[row] += rate * (target - completion[row])

@@ -16,6 +16,9 @@ class MaxQQ(MaxQ):
     holds the pseudo-reward of ending short of the goal; its callers see V(a, s) + C(i, s, a) of the same
     choice, which holds real rewards alone. Without pseudo-rewards both are MAXQ-0's, to the last bit.
 
+    Children that are equal by C~ may differ to callers. Which one they see must not hang on the last digits
+    of what was learnt: it is the one that the task takes when it acts, the first within the settings' `tie`.
+
     Parameters
     ----------
     grounded
@@ -57,6 +60,7 @@ class MaxQQ(MaxQ):
     def __init__(self, grounded: GroundGraph, seed: Sequence[int], settings: Settings | None = None) -> None:
         super().__init__(grounded, seed, settings)
         self._pseudo = pseudo_rewards(grounded)
+        self._taught = [any(row) for row in self._pseudo]
         self.inner_completion = [[list(rows) for rows in tables] for tables in self.completion]
 
     def value(self, task: int, state: int) -> float:
@@ -74,7 +78,10 @@ class MaxQQ(MaxQ):
         return self.inner_q(task, state, k)
 
     def _best(self, task: int, state: int) -> int:
-        """Return a* = argmax_a [C~(i, s, a) + V(a, s)]."""
+        """Return a* = argmax_a [C~(i, s, a) + V(a, s)], the choice whose value callers see."""
+        if self._taught[task]:
+            return self.greedy(task, state)
+        # C~ is C here, and equals are equal to callers, too: the very maximum, as in MAXQ-0.
         return max(self._runnable(task, state), key=lambda k: self.inner_q(task, state, k))
 
     def _learn(self, task: int, k: int, trace: Trace, after: int, rate: float) -> None:
@@ -88,11 +95,11 @@ class MaxQQ(MaxQ):
         if self._terminal[task][after]:
             inside, outside = self._pseudo[task][after], 0.0
         else:
-            best = self._best(task, after)
-            inside, outside = self.inner_q(task, after, best), self.q(task, after, best)
+            inside = max(self._preferences(task, after))
+            outside = self.q(task, after, self._best(task, after))
         inner, outer = self.inner_completion[task][k], self.completion[task][k]
         for at in self._updated(task, k, trace):
-            row = self._row[task][k][trace[at][0]]
+            row = self._row[task][k][trace[at].state]
             discount = self.settings.gamma ** (len(trace) - at)
             inner[row] += rate * (discount * inside - inner[row])
             outer[row] += rate * (discount * outside - outer[row])

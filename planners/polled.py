@@ -1,7 +1,9 @@
 """Polled (non-hierarchical) execution of a hierarchical value function (Dietterich 2000, section 6).
 
 At every primitive step the decision starts from the root anew, so that a subtask is given up as soon as
-another is worth more. Taken from the values of a hierarchical policy, this is never worse than that policy.
+another is worth more. Taken from the exact values of a hierarchical policy, this is never worse than that
+policy, if all the way through a child its callers run, too, and may call it: a guard that no longer holds,
+or a caller that has ended, takes away the choice to go on.
 """
 
 from __future__ import annotations

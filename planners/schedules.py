@@ -1,9 +1,15 @@
-"""How a learner's rate falls with the number of episodes."""
+"""How a learner's rate falls with the number of episodes, and which task goes by which schedule."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import TypeVar
+
+from hierarchy import GroundGraph
+from worlds import UserError, suggest
+
+T = TypeVar("T")
 
 Rate = Callable[[int], float]
 """The rate in an episode, counted from 0."""
@@ -56,3 +62,30 @@ class HarmonicRate:
     def __call__(self, episode: int) -> float:
         """Return the rate in the given episode, counted from 0."""
         return self.half / (self.half + episode)
+
+
+def by_task(grounded: GroundGraph, default: T, named: Mapping[str, T]) -> list[T]:
+    """Return one setting a node: the ground task's own, its task's, or the default.
+
+    Raises
+    ------
+    UserError
+        If a name is no task of the graph.
+
+    Examples
+    --------
+    >>> from hierarchy import ground, two_rooms
+    >>> from worlds import load_layout, maze_model
+    >>> maze = load_layout("two_rooms")
+    >>> grounded = ground(two_rooms(maze), maze_model(maze))
+    >>> halves = by_task(grounded, 150, {"GotoDoor": 50, "GotoDoor(D2)": 20})
+    >>> [halves[grounded.place(name)] for name in ("Root", "GotoDoor(D1)", "GotoDoor(D2)")]
+    [150, 50, 20]
+    """
+    tasks = [node for node in grounded.nodes if node.calls]
+    known = sorted({node.name for node in tasks} | {node.task for node in tasks})
+    for name in named:
+        if name not in known:
+            mend = suggest(name, known, "there are")
+            raise UserError(f"settings name {name!r}, which is no task of {grounded.graph.name}; {mend}")
+    return [named.get(node.name, named.get(node.task, default)) for node in grounded.nodes]

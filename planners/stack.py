@@ -1,8 +1,8 @@
 """The best that a hierarchy can express, and the best that the world allows, exactly.
 
 While a hierarchy runs there is a stack of tasks besides the state (Dietterich 2000, section 3.2). Over both
-it is an ordinary decision problem (the joint states of Andre and Russell, 2002), whose optimum is the
-hierarchically optimal policy.
+it is an ordinary decision problem (Parr and Russell, 1998; the joint states of Andre and Russell, 2002),
+whose optimum is the hierarchically optimal policy.
 """
 
 from __future__ import annotations

@@ -193,13 +193,7 @@ class _Reader:
         """Return the number of a next state or a start."""
         if isinstance(values, Mapping):
             values = self._merged(state, values, where)
-        names = self.index.names
-        if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != len(names):
-            _fail(where, f"{values!r} is no state", f"give {len(names)} values: {', '.join(names)}")
-        for variable, value in zip(self.index.variables, values, strict=True):
-            if not _belongs(value, variable):
-                problem = f"{variable.name} would be {value!r}, which is outside its domain"
-                _fail(where, problem, f"its values are {_listed(variable.labels)}")
+        refuse_if_no_state(values, self.index.variables, where)
         return self.index.number(values)
 
     def _merged(self, state: State | None, changes: Mapping[str, Hashable], where: str) -> tuple[Any, ...]:
@@ -216,6 +210,22 @@ class _Reader:
     def _words(self, state: State) -> str:
         named = zip(self.index.variables, state, strict=True)
         return "state " + ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in named)
+
+
+def refuse_if_no_state(values: Any, variables: Sequence[Variable], where: str) -> None:
+    """Raise a WorldError unless `values` are one value of each variable, in order.
+
+    >>> refuse_if_no_state((3,), [Variable("x", (0, 1))], "start")
+    Traceback (most recent call last):
+    worlds.finite.WorldError: start: x would be 3, which is outside its domain; its values are 0, 1
+    """
+    if not isinstance(values, Sequence) or isinstance(values, str) or len(values) != len(variables):
+        names = ", ".join(variable.name for variable in variables)
+        _fail(where, f"{values!r} is no state", f"give {len(variables)} values: {names}")
+    for variable, value in zip(variables, values, strict=True):
+        if not _belongs(value, variable):
+            problem = f"{variable.name} would be {value!r}, which is outside its domain"
+            _fail(where, problem, f"its values are {_listed(variable.labels)}")
 
 
 def _belongs(value: Any, variable: Variable) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
+from numbers import Real
 from typing import Any, Final
 
 from gymnasium import Env
@@ -12,7 +13,7 @@ from gymnasium.envs.toy_text.cliffwalking import CliffWalkingEnv
 from gymnasium.envs.toy_text.frozen_lake import FrozenLakeEnv
 from gymnasium.envs.toy_text.taxi import TaxiEnv
 
-from worlds.finite import Outcomes, State, WorldError, finite_world
+from worlds.finite import Outcomes, State, WorldError, finite_world, refuse_if_no_state
 from worlds.layout import Cell
 from worlds.model import TransitionModel
 from worlds.taxi import ABOARD, DELIVERED, SITES, changes_of_mind, taxi_variables
@@ -38,7 +39,7 @@ def gym_model(
     *,
     variables: Sequence[Variable] | None = None,
     decode: Decode | None = None,
-    actions: Sequence[str] | None = None,
+    actions: str | Sequence[str] | None = None,
     ended: tuple[str, Hashable] | None = None,
     starts: Iterable[int] | None = None,
 ) -> TransitionModel:
@@ -60,13 +61,13 @@ def gym_model(
     Parameters
     ----------
     env
-        The environment, its observations and actions discrete.
+        The environment, its observations and actions discrete and counted from 0.
     variables, decode
         The state variables, and the function that gives their values for an observation; both or neither.
-        No two observations may have the same values. Joint states that are no observation keep to
+        Every observation has values, and no two have the same. Joint states that are no observation keep to
         themselves.
     actions
-        Names of the actions, by number.
+        Names of the actions, by number; one string of names will do.
     ended
         The variable, and its value, that tell an episode that is over.
     starts
@@ -76,7 +77,8 @@ def gym_model(
     Raises
     ------
     WorldError
-        If the environment exposes no model, or it cannot be read in this way.
+        If the environment exposes no model, it cannot be read in this way, or its table is wrong; the
+        message names the observation, and the action where there is one.
 
     Examples
     --------
@@ -93,6 +95,9 @@ def gym_model(
     if table is None or not hasattr(base.observation_space, "n") or not hasattr(base.action_space, "n"):
         problem = f"{type(base).__name__} exposes no model P over discrete observations and actions"
         raise WorldError(f"{problem}; describe the world with worlds.finite.finite_world instead")
+    if getattr(base.observation_space, "start", 0) or getattr(base.action_space, "start", 0):
+        problem = f"{type(base).__name__} counts its observations or actions from another number than 0"
+        raise WorldError(f"{problem}; count both from 0, in P too")
     if (variables is None) != (decode is None):
         raise WorldError("variables and decode belong together; give both, or neither")
     reading = _reading(base)
@@ -103,7 +108,7 @@ def gym_model(
     elif ended is not None:
         raise WorldError("ended names one of your variables; give variables and decode with it")
     if actions is not None:
-        reading = replace(reading, actions=tuple(actions))
+        reading = replace(reading, actions=tuple(actions.split() if isinstance(actions, str) else actions))
     if len(reading.actions) != base.action_space.n:
         raise WorldError(f"{len(reading.actions)} names for {base.action_space.n} actions; give each one")
     return _World(base, table, reading).model(_first(base) if starts is None else list(starts))
@@ -123,15 +128,47 @@ class _World:
     def __init__(self, base: Any, table: Any, reading: _Reading) -> None:
         self.table = table
         self.reading = reading
-        self.values = [tuple(reading.decode(number)) for number in range(int(base.observation_space.n))]
+        self.width = len(reading.variables) - (reading.fickle > 0)
+        self.values = [self._decoded(number) for number in range(int(base.observation_space.n))]
         self.numbers: dict[tuple[Hashable, ...], int] = {}
         for number, values in enumerate(self.values):
             if values in self.numbers:
                 same = f"observations {self.numbers[values]} and {number} are both {values!r}"
                 raise WorldError(f"{same}; let decode tell them apart")
             self.numbers[values] = number
-        self.width = len(reading.variables) - (reading.fickle > 0)
         self._check_ended()
+
+    def _decoded(self, number: int) -> tuple[Hashable, ...]:
+        """Return the values of an observation."""
+        try:
+            given = self.reading.decode(number)
+        except Exception as error:
+            error.add_note(f"while observation {number} was decoded")
+            raise
+        values = tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else given
+        refuse_if_no_state(values, self.reading.variables[: self.width], f"decode of observation {number}")
+        return tuple(values)
+
+    def _entries(self, number: int, action: int) -> list[tuple[float, int, float, bool]]:
+        """Return the entries of an action in an observation: probability, next one, reward, done."""
+        where = f"P[{number}][{action}]"
+        try:
+            entries = list(self.table[number][action])
+        except (LookupError, TypeError):
+            mend = "each action needs entries in every observation from which an episode goes on"
+            raise WorldError(f"{where} is missing; {mend}") from None
+        for entry in entries:
+            if not isinstance(entry, Sequence) or len(entry) != 4 or not isinstance(entry[0], Real):
+                mend = "give (probability, next observation, reward, done)"
+                raise WorldError(f"{where} has the entry {entry!r}; {mend}")
+            self._check_observation(entry[1], f"{where} leads to")
+        return entries
+
+    def _check_observation(self, number: Any, where: str) -> None:
+        """Refuse what is no observation's number."""
+        if number not in range(len(self.values)):
+            last = len(self.values) - 1
+            raise WorldError(f"{where} {number!r}, which is no observation; they are 0 to {last}")
 
     def _check_ended(self) -> None:
         if self.reading.ended is None:
@@ -151,6 +188,8 @@ class _World:
     def model(self, starts: Sequence[int]) -> TransitionModel:
         """Return the model."""
         reading = self.reading
+        for number in starts:
+            self._check_observation(number, "starts: an episode would begin with")
         final = self._final(starts) if reading.ended is None else frozenset()
         place = {name: action for action, name in enumerate(reading.actions)}
 
@@ -165,14 +204,14 @@ class _World:
                 return state, 0.0
             return [
                 (chance * share, decided, reward)
-                for chance, to, reward, done in self.table[number][place[action]]
+                for chance, to, reward, done in self._entries(number, place[action])
                 for share, decided in changes_of_mind(
                     state, self._after(state, to, done=done), reading.fickle
                 )
             ]
 
         rest = ("open",) if reading.fickle else ()
-        first = [(*self.values[number], *rest) for number in starts]
+        first = [(*self.values[int(number)], *rest) for number in starts]
         return finite_world(reading.variables, reading.actions, outcomes, first, ends=over)
 
     def _after(self, state: State, to: int, *, done: bool) -> State:
@@ -186,8 +225,9 @@ class _World:
         ending: set[int] = set()
         going_on = set(starts)
         while queue:
-            for entries in _each(self.table[queue.pop()]):
-                for chance, to, _, done in entries:
+            number = queue.pop()
+            for action in range(len(self.reading.actions)):
+                for chance, to, _, done in self._entries(number, action):
                     if chance > 0:
                         (ending if done else going_on).add(int(to))
                     if chance > 0 and not done and int(to) not in seen:
@@ -199,11 +239,6 @@ class _World:
             mend = "decode it with a variable of its own for the end, such as over = yes, named by ended"
             raise WorldError(f"{problem}; {mend}")
         return frozenset(ending)
-
-
-def _each(row: Any) -> Iterable[Any]:
-    """Return the entries of every action, whether P keeps them by number or in a list."""
-    return row.values() if isinstance(row, Mapping) else row
 
 
 def _reading(base: Any) -> _Reading:

@@ -34,6 +34,13 @@ class Stream:
     *key
         Any number of integers: seed first, then whatever names the stream (episode, pair, ...).
 
+    Attributes
+    ----------
+    key
+        The stream's name as 64 bits; with `drawn`, all that kernels need to go on with it.
+    drawn
+        How many numbers have been drawn.
+
     Examples
     --------
     >>> a, b = Stream(7, 1), Stream(7, 1)
@@ -47,13 +54,13 @@ class Stream:
         state = 0
         for part in key:
             state = mix(state + _GOLDEN + (part & _MASK))
-        self._key = state
-        self._counter = 0
+        self.key = state
+        self.drawn = 0
 
     def bits(self) -> int:
         """Return 64 random bits."""
-        self._counter += 1
-        return mix(self._key + self._counter * _GOLDEN)
+        self.drawn += 1
+        return mix(self.key + self.drawn * _GOLDEN)
 
     def uniform(self) -> float:
         """Return a float in [0, 1), a multiple of 2**-53."""

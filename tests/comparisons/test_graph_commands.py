@@ -2,15 +2,19 @@
 
 import os
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import pytest
+from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
+from matplotlib.transforms import Bbox
 
 from comparisons.cli import main
+from comparisons.figures_graph import task_graph_figure
 from comparisons.graph_drawing import draw_graph
-from hierarchy import mermaid
-from hierarchy.drawing import dot
-from hierarchy.text import load_graph
-from worlds import UserError
+from hierarchy import TaskGraph, mermaid
+from hierarchy.drawing import dot, task_graph_picture
+from hierarchy.text import LoadedGraph, load_graph
+from worlds import UserError, Variable
 
 WRONG = """\
 graph: wrong
@@ -45,7 +49,7 @@ def test_check_tells_a_graph_and_its_counts(capsys: pytest.CaptureFixture[str]) 
     counts = [line.split() for line in lines[lines.index("values stored:") + 1 :]]
     assert ["completions", "of", "GotoTrigger", "512"] in counts
     assert ["primitive", "actions", "4"] in counts
-    assert ["flat", "Q", "8192"] in counts
+    assert ["all", "of", "these", "1308"] in counts  # the paper's 1284, and 24 of the root
     proved, _, of, *rest = lines[lines.index("state abstraction:") + 1].split()
     assert proved == of
     assert rest[:3] == ["tables", "proved", "safe"]
@@ -154,3 +158,65 @@ def test_check_with_discounting_finds_funnels(capsys: pytest.CaptureFixture[str]
         main(["check", "two_rooms", "--gamma", "1.5"])
     assert refused.value.code == 2
     assert "lies above 0 and up to 1" in capsys.readouterr().err
+
+
+def test_check_tells_taxis_632_values(capsys: pytest.CaptureFixture[str]) -> None:
+    """The graph and the world come with the package; Dietterich's counts, and every table proved."""
+    status, out, err = run(capsys, "check", "taxi")
+    assert (status, err) == (0, "")
+    counts = [line.split() for line in out.splitlines()]
+    for row in ("completions of Navigate 400", "completions of Root 16", "all of these 632", "flat Q 3000"):
+        assert row.split() in counts
+    assert "28 of 28 tables proved safe for every policy" in out
+
+
+def test_check_takes_another_world(capsys: pytest.CaptureFixture[str]) -> None:
+    """Rain proves less, a fickle passenger refutes, and Gymnasium's Taxi has the same variables."""
+    status, out, _ = run(capsys, "check", "taxi", "--world", "taxi-fickle")
+    assert status == 0
+    assert "Put -> Putdown, stored by taxi, destination: refuted" in out
+    status, out, _ = run(capsys, "check", "taxi", "--world", "gym:Taxi-v4")
+    assert status == 0
+    assert "task graph taxi on world gym:Taxi-v4: 4 tasks, 6 primitive actions, 600 states" in out
+
+
+def _hostile() -> TaskGraph:
+    labels = ('"', "\\", "<b>&amp;", "#1;", "a\nb", "[{(|)}]", "\x00\x07\x1b", "$x^2$", "-->", "\u732b")
+    graph = TaskGraph("hostile", [Variable("x", tuple(range(10)), labels)], ["go"])
+    (x,) = graph.variables
+    calls = []
+    for value, label in enumerate(labels):
+        task = graph.task(f"Task {label}", until=x.eq(9 - value), uses=[x], do="go")
+        calls.append(task().when(x.eq(value)))
+    graph.task("Root", until=x.eq(0) & x.eq(1), uses=[x], do=calls)
+    return graph
+
+
+def test_hostile_labels_are_drawn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """All four files are written, and the SVG is XML, whatever the labels hold; nothing is warned of."""
+    graph, world = _hostile(), load_graph("two_rooms").world
+    monkeypatch.setattr(
+        "comparisons.graph_drawing.load_graph", lambda _name, _world: LoadedGraph(graph, world)
+    )
+    paths = draw_graph("hostile", None, tmp_path)
+    assert [path.suffix for path in paths] == [".mmd", ".dot", ".png", ".svg"]
+    assert ET.parse(paths[3]).getroot().tag.endswith("svg")  # noqa: S314 # we wrote it
+
+
+@pytest.mark.parametrize("name", ["two_rooms", "taxi", "hdg"])
+def test_edges_cross_no_box_and_no_label(name: str) -> None:
+    """Between its ends, each edge of the picture keeps clear of every box and every label."""
+    figure = task_graph_figure(task_graph_picture(load_graph(name).graph))
+    axes = figure.axes[0]
+    boxes = [patch.get_window_extent() for patch in axes.patches if isinstance(patch, FancyBboxPatch)]
+    blocks = boxes + [text.get_window_extent() for text in axes.texts if text.get_text().startswith("when")]
+    for i, block in enumerate(blocks):
+        assert not any(block.overlaps(other) for other in blocks[i + 1 :])
+    arrows = [patch for patch in axes.patches if isinstance(patch, FancyArrowPatch)]
+    assert len(arrows) > len(boxes)
+    for arrow in arrows:
+        points = arrow.get_path().interpolated(20).vertices[:-1]  # in pixels; the head may touch its box
+        inner = arrow.get_transform().transform(points)
+        for block in blocks:
+            inside = Bbox.from_extents(block.x0 + 1, block.y0 + 1, block.x1 - 1, block.y1 - 1)
+            assert not any(inside.contains(*point) for point in inner)

@@ -30,3 +30,11 @@ def test_words_cannot_break_out_of_their_quotes() -> None:
     text = dot(graph)
     assert text.startswith('digraph "a \\"graph\\"" {')
     assert '"Top" -> "Root" [label="when x = a\\\\b\\nc"]' in text
+
+
+def test_html_and_control_characters_are_shown_as_they_are() -> None:
+    """Graphviz reads entities in labels, not in names; what no file can hold is shown by a picture of it."""
+    graph = TaskGraph("g", [Variable("x", (0, 1))], ["a &lt; b\x00"])
+    (x,) = graph.variables
+    graph.task("Root", until=x.eq(0), uses=[x], do=graph.actions)
+    assert '    "a &lt; b\u2400" [label="a &amp;lt; b\u2400", shape=hexagon]' in dot(graph).splitlines()

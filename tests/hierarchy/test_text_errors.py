@@ -1,5 +1,6 @@
 """Every mistake in a text is told with its line, its path and a mend."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -138,8 +139,38 @@ def test_the_text_without_mistakes_is_read() -> None:
             "line 1: the tag tag:yaml.org,2002:python/object:os.system is",
         ),
         ("mine", "[" * 30 + "]" * 30, "line 1: it is nested more than 20 deep; write it flatter"),
-        ("mine", "mine\n---\n", "this is no YAML at column 1: but found another document"),
-        ("mine", "mine\x07", "this is no YAML: unacceptable character"),
+        (
+            "mine",
+            "mine\n---\n",
+            "column 1, in what begins in line 1: a second document begins here; keep one",
+        ),
+        ("graph: mine", "graph:", "line 1, graph: it is empty; write something there"),
+        ("until: robot = target", "until:", "line 8, tasks.Goto.until: it is empty"),
+        (
+            "    until: robot",
+            "\tuntil: robot",
+            "line 8: this is no YAML at column 1: a tab cannot indent; indent",
+        ),
+        (
+            "until: robot = target",
+            "until: robot: target",
+            "a ': ' cannot stand here; put the value in quotes",
+        ),
+        (
+            "    within:",
+            "   within:",
+            "line 10: this is no YAML at column 4, in what begins in line 6: it is ind",
+        ),
+        (
+            "uses: [robot]",
+            "uses: [robot, robot]",
+            "line 11, tasks.Goto.uses[1]: 'robot' is given twice; remove",
+        ),
+        ("Goto: {target: there}", "Goto: [there]", "binds no parameters; write - Goto: {PARAMETER: VALUE}"),
+        ("- North\n", "- Goto(target=there)\n", "'Goto(target=there)'; write - Goto: {PARAMETER: VALUE}"),
+        ("graph: mine", 'graph: "\\ud800"', "line 1, graph: an escape stands for half a character"),
+        (TEXT, "---\n", "line 1: the text is empty"),
+        ("mine", "mine\x07", "line 1: the character U+0007 cannot stand in a text; remove it"),
         ("sets:", "sets: {", "this is no YAML at column"),
         (TEXT, "", "line 1: the text is empty; begin it with 'graph: NAME'"),
         (TEXT, "- graph", "line 1: it is no mapping of keys to values; write keys with values"),
@@ -162,7 +193,10 @@ PREDICATE = "doors = open or robot in corner"
     ("text", "column", "expected"),
     [
         ("doors = opn", 9, "unknown value 'opn' of doors; did you mean 'open'?"),
-        ("doors == open", 8, "a name or value is missing before '='"),
+        ("doors == open", 8, "a name or value is missing before '='; write '=' once"),
+        ("doors = open && robot = goal", 9, "of doors; write 'and' for '&&'"),
+        ("doors = open OR robot = goal", 9, "of doors; write 'or' for 'OR'"),
+        ("doors = open and Not robot = goal", 18, "unknown name 'Not robot'; write 'not' for 'Not'"),
         ("doors", 6, "'doors' is compared with nothing; go on with ="),
         ("doors = open and", 17, "a name or value is missing before 'the end'"),
         ("(doors = open", 14, "')' is missing; close the parenthesis"),
@@ -270,6 +304,88 @@ def test_any_text_is_read_or_refused(noise: str, place: int) -> None:
     assert all(told)
 
 
+def test_a_fault_of_a_parameter_is_told_once() -> None:
+    """What depends on it is not told as well."""
+    with pytest.raises(TaskGraphTextError) as caught:
+        parse_graph(TEXT.replace('there: "4,0"', 'there: "1,0"'))
+    (fault,) = caught.value.faults
+    assert (fault.line, fault.path) == (7, "tasks.Goto.params.target")
+
+
+def test_messages_stay_short() -> None:
+    """A long predicate is quoted around the mistake, long words in part, and of many mistakes some."""
+    long = " and ".join(["doors = open"] * 50)
+    with pytest.raises(TaskGraphTextError) as caught:
+        parse_graph(TEXT.replace(PREDICATE, f"{long} and dors = open and {long}"))
+    told = str(caught.value)
+    assert "column 851 of '..." in told
+    assert "dors = open" in told
+    assert len(told) < 300
+    with pytest.raises(TaskGraphTextError) as caught:
+        parse_graph(TEXT.replace("doors = closed", "doors = " + "y" * 50_000))
+    assert len(str(caught.value)) < 800
+    with pytest.raises(TaskGraphTextError) as caught:
+        parse_graph(TEXT.replace("[robot, trigger, doors]", str([f"z{i}" for i in range(40)])))
+    assert len(caught.value.faults) == 40
+    assert str(caught.value).splitlines()[-1] == "and 28 more in task graph"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("ends", ["\n", "\r\n", "\r"])
+def test_editors_ways_to_save_a_file_are_read(tmp_path: Path, encoding: str, ends: str) -> None:
+    """With a byte order mark or without, and with anyone's line ends; lines are counted alike."""
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(TEXT.replace("\n", ends).encode(encoding))
+    assert load_graph(path).graph.tasks == parse_graph(TEXT).graph.tasks
+    path.write_bytes(TEXT.replace("closed", "clsed").replace("\n", ends).encode(encoding))
+    with pytest.raises(TaskGraphTextError, match=r"line 18, tasks\.Root\.do"):
+        load_graph(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (
+            b"graph: a\nworld: \xe4",
+            "mine.yaml, line 2: byte 0xe4 cannot be read as UTF-8 text; save it as UTF-8",
+        ),
+        (TEXT.encode("utf-16"), r"line 1: .*it looks like UTF-16"),
+        (b"\x89PNG\r\n", r"line 1: .*it looks like a picture.*; .* or name another file"),
+        (b"graph: a\nworld: \x00", r"line 2: the character U\+0000 cannot stand in a text; remove it"),
+        (b" " * (4 * LARGEST + 1), "larger than 4000000 bytes; split the task graph"),
+    ],
+)
+def test_files_that_are_no_text_are_refused(tmp_path: Path, content: bytes, told: str) -> None:
+    """The line is named, and what the file seems to be."""
+    path = tmp_path / "mine.yaml"
+    path.write_bytes(content)
+    with pytest.raises(UserError, match=told):
+        load_graph(path)
+
+
+def test_what_is_no_file_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A folder, a pipe, a name that no system takes, and a file that may not be read."""
+    os.mkfifo(tmp_path / "pipe.yaml")
+    cases = [
+        (tmp_path, "this is a folder; name a file in it"),
+        (tmp_path / "pipe.yaml", "this is no ordinary file"),
+        (tmp_path / ("a" * 300), r"it cannot be read \(File name too long\)"),
+    ]
+    for path, told in cases:
+        with pytest.raises(UserError, match=told):
+            load_graph(path)
+
+    def refuse(path: Path) -> bytes:
+        raise PermissionError(13, "Permission denied", str(path))
+
+    (tmp_path / "locked.yaml").write_text(TEXT)
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    with pytest.raises(
+        UserError, match=r"locked.yaml: it cannot be read \(Permission denied\); check the path"
+    ):
+        load_graph(tmp_path / "locked.yaml")
+
+
 def test_files_that_are_not_there_are_named(tmp_path: Path) -> None:
     """A name that is almost right gets a suggestion; bytes that are no text are refused."""
     with pytest.raises(
@@ -277,5 +393,5 @@ def test_files_that_are_not_there_are_named(tmp_path: Path) -> None:
     ):
         load_graph("two_room")
     (tmp_path / "bytes.yaml").write_bytes(b"\xff\xfe\xff")
-    with pytest.raises(UserError, match="cannot be read as UTF-8 text"):
+    with pytest.raises(UserError, match="byte 0xff cannot be read as UTF-8 text"):
         load_graph(tmp_path / "bytes.yaml")

@@ -8,6 +8,7 @@ from learning_worlds import corridor, exact, two_exits
 
 from hierarchy import TaskGraph, ground, two_rooms
 from planners import Exploration, FlatQ, HarmonicRate, LearningRate, MaxQ, Settings, flat_field, flattened
+from planners.learner import Step
 from worlds import maze_model, parse_layout
 
 SMALL = """\
@@ -27,7 +28,7 @@ def test_one_step_by_hand() -> None:
     learner = FlatQ(two_exits(), (0,), Settings(gamma=0.5))
     left, right = learner.table[learner.grounded.root]
     right[2], left[3], right[3] = -2.0, -6.0, -4.0
-    learner._learn(learner.grounded.root, 1, [(2, -1.0)], 3, 0.5)
+    learner._learn(learner.grounded.root, 1, [Step(2, -1.0)], 3, 0.5)
     assert right[2] == -2.5
 
 

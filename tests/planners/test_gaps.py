@@ -64,6 +64,40 @@ def test_one_door_task_is_responsible_for_all_that_is_lost(doors: tuple[GapRepor
         assert one.by_choice == {"GotoDoor": 2}
 
 
+def test_all_states_may_be_looked_at(doors: tuple[GapReport, GapReport]) -> None:
+    """Also those in which no episode starts: on the trigger, with the doors open, GotoDoor falls short.
+
+    With those there are 512 cases of start, trigger and goal, and 32 of them fall short.
+    """
+    grounded = doors[1].grounded
+    index, reached = grounded.model.index, grounded.model.reachable()
+    shut = index.column("doors") == index.variable("doors").values.index("closed")
+    on_trigger = np.array([robot == trigger for robot, trigger, _, _ in index])
+    cases = grounded.model.starts | (reached & on_trigger & ~shut)
+    report = gap_report(grounded, states=cases)
+    assert (report.starts, len(report.shortfalls)) == (512, 32)
+    assert str(report).startswith(
+        "32 of 512 states fall short of the global optimum\nGotoDoor is responsible in 32,"
+    )
+    everywhere = gap_report(grounded, states=reached)
+    assert everywhere.by_task == {"GotoDoor": (79, 158)}
+    assert {one.start for one in report.shortfalls} <= {one.start for one in everywhere.shortfalls}
+    assert all(one.lost == 2 for one in everywhere.shortfalls)
+    assert gap_report(doors[0].grounded, states=reached).shortfalls == ()
+
+
+def test_each_shortfall_can_be_explained(doors: tuple[GapReport, GapReport]) -> None:
+    """The report prints the smallest; the last in words is as far from its start as the longest."""
+    _, report = doors
+    assert str(report).endswith(report.explain(report.shortfalls[0]))
+    assert report.explain(report.shortfalls[-1]).splitlines() == [
+        "from robot = 0,0, trigger = T3, goal = G1, doors = closed",
+        "  -14 recursively, -12 hierarchically, -12 globally",
+        "in robot = 4,2, trigger = T3, goal = G1, doors = open",
+        "  GotoDoor chooses South, the hierarchical optimum North: that costs 2 of 2",
+    ]
+
+
 def test_the_smallest_counter_example_stands_first(doors: tuple[GapReport, GapReport]) -> None:
     """By steps, then by number; the first takes 9 steps where 7 would do."""
     _, report = doors
@@ -138,6 +172,8 @@ def test_losses_add_up_whatever_the_rewards(grounded: GroundGraph) -> None:
         if np.isfinite(one.recursive):
             assert sum(one.by_choice.values()) == pytest.approx(one.hierarchical - one.recursive, abs=1e-7)
             assert sum(one.by_hierarchy.values()) == pytest.approx(one.best - one.hierarchical, abs=1e-7)
+            both = *one.by_choice.values(), *one.by_hierarchy.values()
+            assert sum(both) == pytest.approx(one.lost, abs=1e-7)
 
 
 def test_earning_more_than_the_flat_optimum_is_no_loss() -> None:

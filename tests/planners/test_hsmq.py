@@ -5,6 +5,7 @@ from learning_worlds import corridor, legs, two_exits
 
 from hierarchy import TaskGraph, ground
 from planners import HSMQ, LearningRate, Settings
+from planners.learner import Step
 from worlds import UserError
 
 EXACT = Settings(rate=LearningRate(start=1.0, factor=1.0))
@@ -16,7 +17,7 @@ def test_a_child_backs_up_as_one_long_action() -> None:
     root = grounded.root
     learner = HSMQ(grounded, (0,), Settings(gamma=0.5))
     learner.table[root][1][3] = -8.0
-    learner._learn(root, 0, [(0, -1.0), (1, -1.0), (2, -1.0)], 3, 0.5)
+    learner._learn(root, 0, [Step(0, -1.0), Step(1, -1.0), Step(2, -1.0)], 3, 0.5)
     assert learner.q(root, 0, 0) == -2.75 / 2
     assert learner.table[root][0][1:3] == [0.0, 0.0]
 
@@ -27,7 +28,7 @@ def test_all_states_back_up_the_rewards_from_there_on() -> None:
     root = grounded.root
     learner = HSMQ(grounded, (0,), Settings(gamma=0.5, all_states=True))
     learner.table[root][1][3] = -8.0
-    learner._learn(root, 0, [(0, -1.0), (1, -2.0), (2, -4.0)], 3, 1.0)
+    learner._learn(root, 0, [Step(0, -1.0), Step(1, -2.0), Step(2, -4.0)], 3, 1.0)
     assert learner.table[root][0][:3] == [-1 - 0.5 * 6, -2 - 0.5 * 8, -4 - 0.5 * 8]
 
 
@@ -63,8 +64,8 @@ def test_a_pseudo_reward_stays_within_its_task() -> None:
         assert learner.greedy_steps(out, 1) == steps
         assert learner.greedy_steps(root, 1) == (4 if steps == 4 else 1 + 3 + 2)
     learner = HSMQ(two_exits(), (0,), EXACT)
-    learner._learn(out, 0, [(1, -1.0)], 0, 1.0)
-    learner._learn(root, 0, [(1, -1.0)], 0, 1.0)
+    learner._learn(out, 0, [Step(1, -1.0)], 0, 1.0)
+    learner._learn(root, 0, [Step(1, -1.0)], 0, 1.0)
     assert learner.q(out, 1, 0) == -31.0
     assert learner.q(root, 1, 0) == -1.0
 

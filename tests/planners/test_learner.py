@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from learning_worlds import corridor, exact, legs, two_exits
 
-from hierarchy import TaskGraph, ground, two_rooms
+from hierarchy import TaskGraph, ground
 from planners import (
     HSMQ,
     Boltzmann,
@@ -17,12 +17,12 @@ from planners import (
     FlatQ,
     HarmonicRate,
     Learner,
-    LearningRate,
     MaxQ,
     MaxQQ,
     Settings,
 )
-from worlds import UserError, load_layout, maze_model
+from planners.learner import Step
+from worlds import UserError
 
 LEARNERS: list[type[Learner]] = [MaxQ, MaxQQ, HSMQ, FlatQ]
 every_learner = pytest.mark.parametrize("kind", LEARNERS)
@@ -141,109 +141,45 @@ def test_a_task_with_nothing_to_do_says_where(kind: type[Learner]) -> None:
         learner.train(learner.grounded.root, [0], episodes=1)
 
 
-def test_each_task_may_have_schedules_of_its_own() -> None:
-    """A ground task's own come before its task's, and the default is for the rest."""
-    grounded = legs(7, 2, 4)
-    fast, slow = LearningRate(1.0, 1.0), LearningRate(0.5, 1.0)
-    settings = Settings(rate=slow, rates={"Leg1": fast}, explorations={"Root": Boltzmann()})
-    learner = MaxQ(grounded, (0,), settings)
-    learner.reward[0][0] = -1.0
-    learner.train(grounded.root, [0], episodes=1)
-    # From V(right) = -1 the cells before the last of a leg have learnt V(leg, s') = -1, in full or by half.
-    assert learner.completion[grounded.place("Leg0")][0][:3] == [-0.5, 0.0, 0.0]
-    assert learner.completion[grounded.place("Leg1")][0][2:5] == [-1.0, 0.0, 0.0]
-    assert hash(settings) == hash(Settings(rate=slow))
-    with pytest.raises(UserError, match="settings name 'Leg3', which is no task of legs; did you mean 'Leg"):
-        MaxQ(grounded, (0,), Settings(rates={"Leg3": fast}))
+@every_learner
+def test_a_task_ends_where_its_step_has_led(kind: type[Learner]) -> None:
+    """Its termination is asked of the state after the step: three legs of 2 take 2 steps each, not 3.
 
-
-def test_a_ground_task_s_own_schedule_comes_before_its_task_s() -> None:
-    """One door's rate, the rate of the other doors, and the default for the rest."""
-    layout = load_layout("two_rooms")
-    grounded = ground(two_rooms(layout), maze_model(layout))
-    one, doors = LearningRate(0.25, 1.0), LearningRate(0.5, 1.0)
-    settings = Settings(LearningRate(1.0, 1.0), rates={"GotoDoor": doors, "GotoDoor(D2)": one})
-    learner = MaxQ(grounded, (0,), settings)
-    names = "GotoDoor(D1)", "GotoDoor(D2)", "GotoTrigger(T4)"
-    assert [learner._rates[grounded.place(name)](0) for name in names] == [0.5, 0.25, 1.0]
-
-
-def test_each_task_explores_by_its_own_schedule() -> None:
-    """Out walks at random for ever and Back is greedy: the share of needless steps tells them apart."""
-    grounded = two_exits()
-    settings = Settings(
-        exploration=Exploration(half=1), explorations={"Out": Exploration(half=10**9)}, rate=LearningRate()
-    )
-    learner = MaxQ(grounded, (4,), settings)
-    learner.train(grounded.place("Out"), [2], episodes=300)
-    out = learner.train(grounded.place("Out"), [2], episodes=400)
-    learner.train(grounded.place("Back"), [0], episodes=300)
-    back = learner.train(grounded.place("Back"), [0], episodes=400)
-    assert np.mean(out) == pytest.approx(2 * 3, abs=0.5), "a random walk from 2 to 0 or 5 takes 2 x 3 steps"
-    assert np.mean(back) == pytest.approx(3.0, abs=0.1)
-
-
-def test_all_states_are_a_child_s_primitive_steps_in_one_flat_sequence() -> None:
-    """Three levels: the root learns at each of the four states that Trip's two legs pass, N = 4, 3, 2, 1.
-
-    C(Root, x, Trip) = gamma**N V(Root, 4). Nested sequences would count two steps, one for each leg.
+    What is learnt is told of every call: its task, where it began, how many steps it took, where it ended.
     """
-    model = corridor(6, "right")
-    graph = TaskGraph("trip", model.index.variables, model.actions)
-    (x,) = graph.variables
-    one = graph.task("One", until=x.eq(2), within=x.isin([0, 1]), uses=[x], do="right")
-    two = graph.task("Two", until=x.eq(4), within=x.isin([2, 3]), uses=[x], do="right")
-    trip = graph.task("Trip", until=x.eq(4), within=x.isin(range(4)), uses=[x], do=[one(), two()])
-    graph.task("Root", until=x.eq(5), uses=[x], do=[trip(), "right"])
-    grounded = ground(graph, model)
-    settings = Settings(rate=LearningRate(1.0, 1.0), gamma=0.5, all_states=True)
-    learner = MaxQ(grounded, (0,), settings)
-    learner.train(grounded.root, [4], episodes=1)
-    # An episode of Trip called by the root, without exploration by the root.
-    trace, after = learner._run(grounded.place("Trip"), 0)
-    assert trace == [(0, -1.0), (1, -1.0), (2, -1.0), (3, -1.0)]
-    assert after == 4
-    learner._learn(grounded.root, 0, trace, after, 1.0)
-    assert [learner.c(grounded.root, at, 0) for at in range(4)] == [-1 / 16, -1 / 8, -1 / 4, -1 / 2]
+    learner = kind(legs(7, 2, 4), (0,))
+    nodes, told = learner.grounded.nodes, []
+    learn = learner._learn
+
+    def telling(task: int, k: int, trace: list[Step], after: int, rate: float) -> None:
+        told.append((nodes[task].calls[k].child, trace[0].state, len(trace), after))
+        learn(task, k, trace, after, rate)
+
+    learner._learn = telling  # type: ignore[method-assign]
+    assert learner.train(learner.grounded.root, [0], episodes=1) == [6]
+    steps = [(0, at, 1, at + 1) for at in range(6)]
+    assert [one for one in told if one[0] == 0] == steps
+    called = [(nodes[child].name, *rest) for child, *rest in told if child > 0]
+    expected = [("Leg0", 0, 2, 2), ("Leg1", 2, 2, 4), ("Leg2", 4, 2, 6)]
+    assert called == ([] if kind is FlatQ else expected)
 
 
-@pytest.mark.parametrize("kind", [MaxQ, MaxQQ])
-def test_learning_at_all_states_takes_fewer_episodes_and_ends_the_same(kind: type[MaxQ]) -> None:
-    """In a corridor of 24 whose legs are known, the root learns V(Root, x) = x - 23 for every cell.
+@pytest.mark.parametrize("kind", [MaxQ, MaxQQ, HSMQ])
+def test_how_long_each_task_lasts_and_how_often_it_is_called(kind: type[Learner]) -> None:
+    """Greedy returns alone would not show tasks that are dropped after a step, or one that lasts for ever.
 
-    Learning at each child's first state it has to start in every cell; learning at all states, in cell 0.
-    Ten seeds together.
+    From 1 in two exits Out either goes to the goal in one call of 4 steps, or quits after 1, is followed by
+    Back's 3, and is called again for 2.
     """
-
-    def episodes(seed: int, starts: list[int], *, all_states: bool) -> int:
-        grounded = legs(24, 8, 16)
-        settings = Settings(rate=LearningRate(1.0, 1.0), all_states=all_states)
-        learner = kind(grounded, (seed,), settings)
-        for leg, begin in (("Leg0", 0), ("Leg1", 8), ("Leg2", 16)):
-            learner.train(grounded.place(leg), [begin], episodes=10)
-        for count in range(1, 500):
-            learner.train(grounded.root, starts, episodes=1)
-            if all(learner.value(grounded.root, x) == x - 23 for x in range(24)):
-                return count
-        return 500
-
-    assert episodes(0, [0], all_states=True) == 2, "Leg1 before Leg0"
-    assert episodes(0, [0], all_states=False) == 500
-    anywhere = list(range(23))
-    few = sum(episodes(seed, anywhere, all_states=True) for seed in range(10))
-    many = sum(episodes(seed, anywhere, all_states=False) for seed in range(10))
-    assert 2 * few < many < 10 * 500
-
-
-def test_a_state_where_the_child_may_not_be_called_is_passed_over() -> None:
-    """Out is called from 3 alone; on its way through 2 and 1 the root learns nothing of calling it there."""
-    model = corridor(5)
-    graph = TaskGraph("guarded", model.index.variables, model.actions)
-    (x,) = graph.variables
-    out = graph.task("Out", until=x.eq(1), uses=[x], do="left")
-    graph.task("Root", until=x.eq(0), uses=[x], do=[out().when(x.isin([4, 2])), "left"])
-    grounded = ground(graph, model)
-    learner = MaxQ(grounded, (0,), Settings(rate=LearningRate(1.0, 1.0), all_states=True))
-    learner.reward[0] = [-1.0]
-    learner._learn(grounded.root, 0, [(4, -1.0), (3, -1.0), (2, -1.0)], 1, 1.0)
-    assert learner.completion[grounded.root][0] == [0.0, 0.0, -1.0, 0.0, -1.0]
+    learner = kind(two_exits(), (0,))
+    grounded = learner.grounded
+    learner.train(grounded.root, [1, 2, 3, 4], episodes=1500)
+    state, calls = 1, []
+    while not grounded.nodes[grounded.root].terminal[state] and len(calls) < 9:
+        child = grounded.nodes[grounded.root].calls[learner.greedy(grounded.root, state)].child
+        route = learner.greedy_route(child, state)
+        assert route
+        calls.append((grounded.nodes[child].name, len(route)))
+        state = learner.follow(route[-1][1], route[-1][0])
+    assert calls == ([("Out", 1), ("Back", 3), ("Out", 2)] if kind is MaxQ else [("Out", 4)])
+    assert sum(steps for _, steps in calls) == learner.greedy_steps(grounded.root, 1)

@@ -8,6 +8,7 @@ from learning_worlds import corridor, exact, two_exits
 
 from hierarchy import GroundGraph, TaskGraph, ground
 from planners import Exploration, HarmonicRate, LearningRate, MaxQ, MaxQQ, Settings
+from planners.learner import Step
 from worlds import StateIndex, TransitionModel, Variable
 
 EXACT = Settings(rate=LearningRate(start=1.0, factor=1.0))
@@ -98,7 +99,7 @@ def test_the_first_update_by_hand() -> None:
     for at, cost in enumerate((-1.0, -2.0, -4.0, -8.0)):
         learner.reward[0][leaf.projection[at]] = cost
     learner.completion[root][0][1], learner.inner_completion[root][0][1] = -8.0, -16.0
-    learner._learn(root, 0, [(0, -1.0)], 1, 0.5)
+    learner._learn(root, 0, [Step(0, -1.0)], 1, 0.5)
     assert learner.c(root, 0, 0) == -2.5
     assert learner.inner_completion[root][0][0] == -4.5
 
@@ -124,11 +125,29 @@ def test_c_follows_the_choice_of_c_tilde() -> None:
     left, right = 0, 1
     learner.completion[out][left][1], learner.completion[out][right][1] = -1.0, -5.0
     learner.inner_completion[out][left][1], learner.inner_completion[out][right][1] = -30.0, -6.0
-    learner._learn(out, left, [(2, -1.0)], 1, 1.0)
+    learner._learn(out, left, [Step(2, -1.0)], 1, 1.0)
     assert learner.c(out, 2, left) == -5.0
     assert learner.inner_completion[out][left][2] == -6.0
     assert learner.value(out, 1) == -5.0
     assert learner.greedy(out, 1) == right
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_callers_see_the_child_that_is_taken_among_equals(seed: int) -> None:
+    """At -1 for quitting, Out from 2 is indifferent; it takes left, in 2 steps, and not right, in 3.
+
+    Which of the two is larger by C~ hangs on the last digits of what was learnt (seeds 0 and 3: right). V is
+    that of the child taken, for Out and for the root, which would have it 7 or 8.
+    """
+    grounded = two_exits(pseudo_reward=-1.0)
+    out, root = grounded.place("Out"), grounded.root
+    learner = MaxQQ(grounded, (seed,), Settings(rate=HarmonicRate(20)))
+    learner.train(root, [1, 2, 3, 4], episodes=1500)
+    solution = exact(grounded)
+    assert (solution.values[out, 2], solution.values[root, 2]) == pytest.approx((-2, -7))
+    assert (learner.greedy(out, 2), learner.greedy_steps(root, 2)) == (0, 7)
+    assert learner.value(out, 2) == pytest.approx(-2, abs=0.02)
+    assert learner.value(root, 2) == pytest.approx(-7, abs=0.3)
 
 
 @pytest.mark.parametrize("all_states", [False, True])

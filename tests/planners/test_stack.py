@@ -20,6 +20,9 @@ from planners import (
 )
 from worlds import StateIndex, TransitionModel, Variable, load_layout, maze_model
 
+Running = tuple[tuple[int, ...], int]
+"""A task stack and a state."""
+
 
 def _value_iteration(
     model: TransitionModel, terminal: NDArray[np.bool_], gamma: float
@@ -182,6 +185,64 @@ def test_the_hierarchical_optimum_is_the_best_of_all_policies(
         value = evaluate(grounded, np.array(choices).reshape(-1, 3), gamma=0.9)[-1].value
         expected = np.maximum(expected, value)
     assert hierarchical_optimum(grounded, gamma=0.9).value[0] == pytest.approx(expected, abs=1e-7)
+
+
+def _value_iteration_over_stacks(grounded: GroundGraph, gamma: float, rounds: int) -> dict[Running, float]:
+    """Return the optimal values of task stacks and states as a dictionary, in the plainest way.
+
+    Calls take no time; after a step the tasks on top that have ended leave, except the root. Where
+    nothing may be called the value is -inf.
+    """
+    model, nodes = grounded.model, grounded.nodes
+
+    def left(stack: tuple[int, ...], state: int) -> tuple[int, ...]:
+        return left(stack[:-1], state) if len(stack) > 1 and nodes[stack[-1]].terminal[state] else stack
+
+    def worth(stack: tuple[int, ...], state: int, now: dict[Running, float]) -> float:
+        if stack == (grounded.root,) and nodes[grounded.root].terminal[state]:
+            return 0.0
+        best = -np.inf
+        for call in nodes[stack[-1]].calls:
+            if call.available[state] and nodes[call.child].calls:
+                best = max(best, worth((*stack, call.child), state, now))
+            elif call.available[state]:
+                columns = model.probabilities, model.outcome_rewards, model.outcomes
+                outcomes = zip(*(column[state, call.child].tolist() for column in columns), strict=True)
+                after = ((p, r, (left(stack, to), to)) for p, r, to in outcomes if p > 0)
+                best = max(best, sum(p * (r + gamma * now.get(there, 0.0)) for p, r, there in after))
+        return best
+
+    stacks = [(grounded.root,)]
+    for stack in stacks:
+        stacks += [(*stack, c) for c in {call.child for call in nodes[stack[-1]].calls} if nodes[c].calls]
+    now: dict[Running, float] = {}
+    for _ in range(rounds):
+        now = {(stack, s): worth(stack, s, now) for stack in stacks for s in range(model.index.size)}
+    return now
+
+
+@settings(max_examples=25, deadline=None)
+@given(ground_graphs(least=-4, most=4, sizes=(2, 4)), st.sampled_from([0.5, 0.7]))
+def test_the_hierarchical_optimum_is_value_iteration_s(grounded: GroundGraph, gamma: float) -> None:
+    """With three levels, shared tasks and rewards of either sign: every stack where it can run."""
+    best = hierarchical_optimum(grounded, gamma)
+    expected = _value_iteration_over_stacks(grounded, gamma, rounds=60)
+    for place, stack in enumerate(best.problem.stacks):
+        for state in range(grounded.model.index.size):
+            top = grounded.nodes[stack[-1]]
+            if top.live[state] or (stack == (grounded.root,)):
+                assert best.value[place, state] == pytest.approx(expected[stack, state], abs=1e-5)
+
+
+@settings(max_examples=15, deadline=None)
+@given(ground_graphs(least=-3, most=-1, sizes=(2, 3)))
+def test_undiscounted_the_hierarchical_optimum_is_value_iteration_s(grounded: GroundGraph) -> None:
+    """Where every step costs: equal wherever some policy ends, and without bound elsewhere."""
+    best = hierarchical_optimum(grounded)
+    expected = _value_iteration_over_stacks(grounded, 1.0, rounds=400)
+    for state, value in enumerate(best.value[0]):
+        slow = expected[(grounded.root,), state]
+        assert value == pytest.approx(slow, abs=1e-5) if np.isfinite(value) else slow < -90
 
 
 def test_what_is_best_may_depend_on_the_stack_by_hand() -> None:

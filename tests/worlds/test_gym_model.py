@@ -139,20 +139,28 @@ def test_our_taxi_is_gymnasium_s(rain: float, fickle: float) -> None:
 
 
 @pytest.mark.parametrize("slippery", [False, True])
-@pytest.mark.parametrize("name", ["FrozenLake-v1", "CliffWalking-v1"])
-def test_grids_step_as_the_environment_does(name: str, slippery: bool) -> None:
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("FrozenLake-v1", {}),
+        ("FrozenLake-v1", {"map_name": "8x8"}),
+        ("FrozenLake-v1", {"desc": ["SFHFS", "FFFFF", "HFGHF"], "reward_schedule": (10, -5, -1)}),
+        ("CliffWalking-v1", {}),
+    ],
+)
+def test_grids_step_as_the_environment_does(name: str, words: dict[str, Any], slippery: bool) -> None:
     """Each action's outcomes occur as often as in the environment; an end keeps to itself at no reward."""
-    env = gymnasium.make(name, is_slippery=slippery).unwrapped
+    env = gymnasium.make(name, is_slippery=slippery, **words).unwrapped
     env.reset(seed=2)
     model = gym_model(env)
     assert model.is_deterministic is not slippery
-    assert np.flatnonzero(model.starts).tolist() == [int(np.argmax(env.initial_state_distrib))]
+    assert np.flatnonzero(model.starts).tolist() == np.flatnonzero(env.initial_state_distrib).tolist()
     ends = {int(to) for row in env.P.values() for found in row.values() for _, to, _, done in found if done}
     live = np.flatnonzero(model.reachable()).tolist()
     for state in ends:
         assert (model.outcomes[state][model.probabilities[state] > 0] == state).all()
         assert (model.rewards[state] == 0).all()
-    draws = 300 if slippery else 1
+    draws = 200 if slippery else 1
     for state in sorted(set(live) - ends):
         for action in range(4):
             found = {
@@ -160,6 +168,27 @@ def test_grids_step_as_the_environment_does(name: str, slippery: bool) -> None:
                 for (to, reward, _), count in _observed(env, state, action, draws).items()
             }
             assert _agree(_chances(model, state, action), found)
+
+
+def test_a_lake_of_any_shape_is_read_as_its_cells() -> None:
+    """By rows and columns: a wide lake with two starts, whose holes and goal have rewards of their own.
+
+    With success in half of the cases, a step right from beside the goal slips up or down in a quarter each.
+    """
+    words = {"desc": ["SFHFS", "FFFFF", "HFGHF"], "reward_schedule": (10, -5, -1), "success_rate": 0.5}
+    model = gym_model(gymnasium.make("FrozenLake-v1", **words))
+    assert [model.index.state(int(state)) for state in np.flatnonzero(model.starts)] == [
+        (Cell(0, 0),),
+        (Cell(0, 4),),
+    ]
+    beside, right = model.index.number((Cell(2, 1),)), model.actions.index("Right")
+    assert _chances(model, beside, right) == {
+        ((Cell(2, 2),), 10.0): 0.5,
+        ((Cell(1, 1),), -1.0): 0.25,
+        ((Cell(2, 1),), -1.0): 0.25,
+    }
+    left = model.actions.index("Left")
+    assert _chances(model, beside, left)[(Cell(2, 0),), -5.0] == 0.5
 
 
 class _Toy(gymnasium.Env[int, int]):
@@ -226,12 +255,77 @@ def test_an_unknown_environment_is_one_variable() -> None:
             {"variables": [Variable("a", (0, 1))], "decode": lambda number: (number,), "ended": ("a", 1)},
             "observation 1 has a = 1 already",
         ),
+        (
+            {"variables": [Variable("a", (0, 1))], "decode": lambda n: n},
+            "observation 0: 0 is no state; give 1",
+        ),
+        (
+            {"variables": [Variable("a", (0, 1))], "decode": lambda n: (n, n)},
+            r"decode of observation 0: \(0, 0\) is no state; give 1 values: a",
+        ),
+        (
+            {"variables": [Variable("a", (0, 1))], "decode": lambda n: (2 * n,)},
+            "decode of observation 1: a would be 2, which is outside its domain; its values are 0, 1",
+        ),
+        (
+            {"variables": [Variable("a", (0, 1))], "decode": lambda n: ([n],)},
+            r"decode of observation 0: a would be \[0\], which is outside",
+        ),
+        ({"starts": [2]}, "starts: an episode would begin with 2, which is no observation; they are 0 to 1"),
+        ({"starts": [-1]}, "begin with -1, which is no observation"),
+        ({"starts": []}, "no state is a start"),
     ],
 )
 def test_wrong_readings_are_refused(words: dict[str, Any], message: str) -> None:
     """The error says what does not fit, and the mend."""
     with pytest.raises(WorldError, match=message):
         gym_model(_Toy(), **words)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({}, r"P\[0\]\[0\] is missing; each action needs entries"),
+        ({0: {}}, r"P\[0\]\[0\] is missing"),
+        ({0: {0: [(1.0, 1, 0, False)]}}, r"P\[1\]\[0\] is missing"),
+        ([[[(1.0, 1, 0)]]], r"P\[0\]\[0\] has the entry \(1.0, 1, 0\); give \(probability, next observation"),
+        ([[[0.5, 0.5]]], r"P\[0\]\[0\] has the entry 0.5; give"),
+        ([[[("half", 1, 0, False)]]], r"P\[0\]\[0\] has the entry \('half', 1, 0, False\); give"),
+        ([[[(1.0, 2, 0, True)]]], r"P\[0\]\[0\] leads to 2, which is no observation; they are 0 to 1"),
+        ([[[(1.0, -1, 0, True)]]], r"P\[0\]\[0\] leads to -1, which is no observation"),
+        ([[[(0.5, 1, 0, True)]]], "state state = 0, action action0: the probabilities sum to 0.5, not to 1"),
+    ],
+)
+def test_a_wrong_table_is_refused(table: Any, message: str) -> None:
+    """The error names the place in P, what is wrong, and the mend."""
+    toy = _Toy()
+    toy.P = table
+    with pytest.raises(WorldError, match=message):
+        gym_model(toy)
+
+
+def test_an_error_in_the_user_s_decode_says_where() -> None:
+    """It keeps its type, and gains a note."""
+    with pytest.raises(ZeroDivisionError) as caught:
+        gym_model(_Toy(), variables=[Variable("a", (0, 1))], decode=lambda number: (1 // (1 - number),))
+    assert caught.value.__notes__ == ["while observation 1 was decoded"]
+
+
+def test_counting_from_one_is_refused() -> None:
+    """Gymnasium allows it; P is read from 0 on."""
+    toy = _Toy()
+    toy.observation_space = Discrete(2, start=1)
+    with pytest.raises(
+        WorldError, match="_Toy counts its observations or actions from another number than 0"
+    ):
+        gym_model(toy)
+
+
+def test_actions_may_be_named_in_one_string() -> None:
+    """As in `finite_world`."""
+    toy = _Toy()
+    toy.P[0][0] = [(1.0, 1, 5, True)]
+    assert gym_model(toy, actions="go").actions == ("go",)
 
 
 def test_an_environment_without_a_model_is_refused() -> None:
