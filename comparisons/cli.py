@@ -75,9 +75,10 @@ def check(graph: str, /, *, world: str | None = None, gamma: float = 1.0) -> int
     Parameters
     ----------
     graph
-        A YAML file, or the name of a graph that comes with the package (two_rooms).
+        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg).
     world
-        World to check it on: a name or a .maze file. Defaults to the one that the graph names.
+        World to check it on: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one
+        that the graph names.
     gamma
         Discount factor that it is to be learnt with; below 1, tables that forget time are findings.
     """
@@ -95,9 +96,10 @@ def draw(graph: str, /, *, world: str | None = None, out: Path = Path()) -> int:
     Parameters
     ----------
     graph
-        A YAML file, or the name of a graph that comes with the package (two_rooms).
+        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg).
     world
-        World that it is for: a name or a .maze file. Defaults to the one that the graph names.
+        World that it is for: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one
+        that the graph names.
     out
         Folder of the files. None of them may exist.
     """

@@ -52,6 +52,11 @@ class TableSize:
         """Values as published counts have them, and none where all are 0."""
         return 0 if self.zero else self.product
 
+    @property
+    def read(self) -> int:
+        """Values of these that are ever read."""
+        return 0 if self.zero else self.live
+
 
 @dataclass(frozen=True)
 class TableSizes:
@@ -79,6 +84,10 @@ class TableSizes:
     def of(self, task: str) -> int:
         """Return the number of completion values that a task needs, over all its bindings and calls."""
         return sum(table.needed for table in self.tables if table.task == task)
+
+    def read_of(self, task: str) -> int:
+        """Return how many of these are ever read."""
+        return sum(table.read for table in self.tables if table.task == task)
 
     def __str__(self) -> str:
         lines = [f"{table.task} -> {table.call}: {table.needed}" for table in self.tables]

@@ -46,6 +46,17 @@ class LayoutError(UserError):
         self.mend = mend
 
 
+def nearest(word: str, known: Iterable[str]) -> str | None:
+    """Return the known word that an unknown one is probably a slip of, or None.
+
+    Examples
+    --------
+    >>> nearest("spere", ["cube", "sphere"]), nearest("pyramid", ["cube", "sphere"])
+    ('sphere', None)
+    """
+    return next(iter(get_close_matches(word, list(known), n=1)), None)
+
+
 def suggest(word: str, known: Iterable[str], otherwise: str = "use one of") -> str:
     """Return a mend for an unknown word: the nearest known one, or `otherwise` and what is known.
 
@@ -55,8 +66,8 @@ def suggest(word: str, known: Iterable[str], otherwise: str = "use one of") -> s
     ("did you mean 'sphere'?", 'use one of cube, sphere')
     """
     names = list(dict.fromkeys(known))
-    near = get_close_matches(word, names, n=1)
-    if near:
-        return f"did you mean {near[0]!r}?"
+    near = nearest(word, names)
+    if near is not None:
+        return f"did you mean {near!r}?"
     more = ", ..." if len(names) > _LISTED else ""
     return f"{otherwise} {', '.join(names[:_LISTED]) or 'none'}{more}"

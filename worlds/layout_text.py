@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from importlib.resources import files
 from pathlib import Path
 from typing import NoReturn
 
-from worlds.errors import LayoutError, UserError, suggest
+from worlds.errors import LayoutError, UserError, nearest, suggest
 from worlds.layout import KINDS, SIZES, Appears, Cell, Edge, Kind, Layout, Obstacle, Size, edge
 from worlds.layout_checks import layout_faults
 
@@ -48,10 +47,10 @@ def load_layout(name: str | Path) -> Layout:
         text = files("worlds").joinpath("layouts", name + _SUFFIX).read_text(encoding="utf-8")
         return parse_layout(text, source=name + _SUFFIX)
     path = Path(name)
-    if not path.is_file():
-        hint = suggest(str(name), layout_names(), "layouts by name:")
-        raise UserError(f"{name}: no layout of this name and no such file; {hint}")
     try:
+        if not path.is_file():
+            hint = suggest(str(name), layout_names(), "layouts by name:")
+            raise UserError(f"{name}: no layout of this name and no such file; {hint}")
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise UserError(f"{path}: cannot be read as UTF-8 text ({error}); check the file") from error
@@ -314,4 +313,4 @@ def _misspelt_key(words: list[str], section: str) -> bool:
         fits = words[0] in (".", "X", "|", ":") or _MARK.fullmatch(words[0]) is not None
     else:
         fits = len(words) >= _OBSTACLE_WORDS
-    return not fits and bool(get_close_matches(words[0], _KEYS, n=1))
+    return not fits and nearest(words[0], _KEYS) is not None

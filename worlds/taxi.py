@@ -1,4 +1,4 @@
-"""Dietterich's Taxi (2000, section 2), with the rain and the fickle passenger of section 7.1."""
+"""Dietterich's Taxi (2000, section 3.1), with the rain and the fickle passenger of section 7.1."""
 
 from __future__ import annotations
 
