@@ -52,7 +52,11 @@ def load_layout(name: str | Path) -> Layout:
             hint = suggest(str(name), layout_names(), "layouts by name:")
             raise UserError(f"{name}: no layout of this name and no such file; {hint}")
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise UserError(
+            f"{path}: it cannot be read ({error.strerror}); check the path and its rights"
+        ) from error
+    except UnicodeDecodeError as error:
         raise UserError(f"{path}: cannot be read as UTF-8 text ({error}); check the file") from error
     return parse_layout(text, source=str(path))
 
