@@ -93,6 +93,8 @@ class Learner(ABC):
         Episodes of each node since its schedules began.
     steps
         Primitive steps of learning so far.
+    random, chance
+        The streams of learning and of greedy ways.
 
     Raises
     ------
@@ -113,7 +115,7 @@ class Learner(ABC):
         self.episodes = [0] * len(nodes)
         self.steps = 0
         self._limit = 0
-        self._random, self._chance = streams_of(seed)
+        self.random, self.chance = streams_of(seed)
 
     @abstractmethod
     def value(self, task: int, state: int) -> float:
@@ -163,7 +165,7 @@ class Learner(ABC):
         counts = []
         for _ in range(episodes):
             self._limit = self.steps + self.settings.max_steps
-            counts.append(len(self._run(task, self._random.choose(starts))[0]))
+            counts.append(len(self._run(task, self.random.choose(starts))[0]))
             if after_each is not None:
                 after_each()
         return counts
@@ -175,7 +177,7 @@ class Learner(ABC):
         its own, and learns its reward at its caller's rate.
         """
         if task < self._primitives:
-            after, reward = self._act(task, state, self._random)
+            after, reward = self._act(task, state, self.random)
             self._learn_reward(task, state, reward, caller_rate)
             self.steps += 1
             if self.steps > self._limit:
@@ -224,7 +226,7 @@ class Learner(ABC):
         """Choose a child by the task's way to explore."""
         choices, settings = self._runnable(task, state), self.settings
         return self._explorers[task].choose(
-            level, choices, lambda: self._preferences(task, state), settings.tie, self._random
+            level, choices, lambda: self._preferences(task, state), settings.tie, self.random
         )
 
     def _preferences(self, task: int, state: int) -> list[float]:
@@ -264,7 +266,7 @@ class Learner(ABC):
 
         Chance has a stream of its own here, so that a measurement never changes what is learnt after it.
         """
-        return self._act(action, state, self._chance)[0]
+        return self._act(action, state, self.chance)[0]
 
     def greedy_route(self, task: int, state: int, limit: int = 1000) -> list[tuple[int, int]] | None:
         """Return the (state, primitive action) pairs of the greedy policy, or None past `limit` steps."""

@@ -60,7 +60,7 @@ class MaxQQ(MaxQ):
     def __init__(self, grounded: GroundGraph, seed: Sequence[int], settings: Settings | None = None) -> None:
         super().__init__(grounded, seed, settings)
         self._pseudo = pseudo_rewards(grounded)
-        self._taught = [any(row) for row in self._pseudo]
+        self._taught = [bool(node.pseudo_reward) for node in grounded.nodes]
         self.inner_completion = [[list(rows) for rows in tables] for tables in self.completion]
 
     def value(self, task: int, state: int) -> float:
