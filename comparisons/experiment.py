@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Final, Protocol, TypeVar
 
 from comparisons.dynamic import Tally, judge, random_episode
 from comparisons.eyes import Sight
@@ -22,6 +22,9 @@ from worlds.camera import Camera
 from worlds.twin import Twin
 
 T = TypeVar("T")
+
+RUNS: Final = 100
+"""Runs of every pair, each with a seed of its own; the first has the experiment's."""
 
 
 class Track(Protocol):
@@ -102,12 +105,24 @@ class Example:
 
 @dataclass(frozen=True)
 class Learnt:
-    """What a pair learnt: grids and starts in which it differs from the oracle."""
+    """What a pair learnt: grids and starts in which it differs from the oracle.
+
+    Parameters
+    ----------
+    trigger, goal
+        The pair.
+    wrong_grids, wrong_starts
+        Of the run with the experiment's seed.
+    runs, optimal_runs
+        How many runs learnt, with this and the seeds after it, and how many equal the oracle everywhere.
+    """
 
     trigger: str
     goal: str
     wrong_grids: int
     wrong_starts: int
+    runs: int
+    optimal_runs: int
 
     @property
     def optimal(self) -> bool:
@@ -169,12 +184,14 @@ class Experiment:
         pairs = [(t, g) for t in self.layout.triggers for g in self.layout.goals]
         found = []
         for trigger, goal in self._show(pairs, len(pairs), "learning the pairs"):
-            learner = PairLearner(self.layout, self.grounded, trigger, goal, self.spec.seed)
+            learner = PairLearner(self.layout, self.grounded, trigger, goal, seed=self.spec.seed, runs=RUNS)
             shown = (trigger, goal) == (self.layout.trigger, self.layout.goal)
             curves = learner.learn(curves=shown)
             self.curves = curves if shown else self.curves
             self.learners[trigger, goal] = learner
-            found.append(Learnt(trigger, goal, learner.wrong_grids(), learner.wrong_starts()))
+            grids, starts = learner.wrong_grids(), learner.wrong_starts()
+            optimal = int(((grids == 0) & (starts == 0)).sum())
+            found.append(Learnt(trigger, goal, int(grids[0]), int(starts[0]), RUNS, optimal))
         return tuple(found)
 
     def example(self) -> Example:

@@ -4,12 +4,13 @@ They use no pyplot and no global state, and the same data gives the same bytes (
 """
 
 from comparisons.figures_graph import task_graph_figure
-from comparisons.figures_learning import convergence_figure, step_tables_figure, value_counts_figure
+from comparisons.figures_learning import band, convergence_figure, step_tables_figure, value_counts_figure
 from comparisons.figures_perception import confusion_figure, detections_figure, push_figure
 from comparisons.figures_routes import counterexample_figure, layout_figure, trajectories_figure
 from comparisons.style import save_figure
 
 __all__ = [
+    "band",
     "confusion_figure",
     "convergence_figure",
     "counterexample_figure",

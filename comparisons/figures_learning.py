@@ -10,19 +10,21 @@ from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
 
-from comparisons.style import BLUE, GREY, INK, PALE, RED, SKY, VERMILION, Look, grid_of, panel, styled
+from comparisons.style import BLUE, GREY, INK, PALE, RED, VERMILION, Look, grid_of, panel, styled
 from worlds import Cell
 
-Curve = Sequence[float] | Mapping[str, Sequence[float]]
-"""Steps from start to subgoal, one an episode: of training alone, or by name (training, greedy)."""
+Band = NDArray[np.float64]
+"""First quartile, median and third quartile of some runs' steps, one an episode, shape (3, episodes)."""
 
+_BEYOND = 1e6
 _NO_ROUTE = "\N{EN DASH}"
 _NEAR_TO_FAR = LinearSegmentedColormap.from_list("near_to_far", ["#F7FBFF", "#8DBBDD"])
 
 
 @styled
-def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -> Figure:
+def convergence_figure(curves: Mapping[str, Mapping[str, Band]], optima: Mapping[str, int]) -> Figure:
     """Draw how many steps each subtask takes as it is learnt, a panel each (figure 12).
 
     The axis ends at 10 steps as the paper's does (or just above the optimum, if that is more):
@@ -31,15 +33,15 @@ def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -
     Parameters
     ----------
     curves
-        Per panel, in order: the steps of every training episode, or a mapping with ``training``, its
-        running ``median`` and ``greedy`` (the learnt policy without exploration). A shorter curve is
-        spread over the episodes of the longest.
+        Per panel, in order: a band of ``training`` episodes, of the ``greedy`` policy without exploration,
+        or of both. A shorter one is spread over the episodes of the longest.
     optima
         Per panel, the fewest possible steps; drawn dashed.
 
     Examples
     --------
-    >>> figure = convergence_figure({"GotoTrigger(T4)": {"training": [9, 7], "greedy": [8, 6]}}, {})
+    >>> training = band([[9, 7], [8, 6], [8, 7]])
+    >>> figure = convergence_figure({"GotoTrigger(T4)": {"training": training}}, {"GotoTrigger(T4)": 6})
     >>> figure.axes[0].get_title(loc="left")
     '(a) GotoTrigger(T4)'
     """
@@ -49,7 +51,7 @@ def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -
     axes = None
     for i, (name, curve) in enumerate(curves.items()):
         axes = figure.add_subplot(grid[divmod(i, columns)])
-        _draw_curves(axes, curve if isinstance(curve, Mapping) else {"training": curve}, optima.get(name))
+        _draw_bands(axes, curve, optima.get(name))
         axes.set_title(panel(i, name), loc="left")
         axes.set_xlabel("episodes")
         if i % columns == 0:
@@ -67,27 +69,44 @@ def convergence_figure(curves: Mapping[str, Curve], optima: Mapping[str, int]) -
     return figure
 
 
-def _draw_curves(axes: Axes, curves: Mapping[str, Sequence[float]], optimum: int | None) -> None:
-    looks: dict[str, Look] = {
-        "training": {
-            "color": SKY,
-            "linestyle": "",
-            "marker": ".",
-            "markersize": 1.6,
-            "alpha": 0.5,
-            "label": "training episodes",
-        },
-        "median": {"color": BLUE, "linewidth": 1.3, "label": "their running median"},
-        "greedy": {"color": INK, "linewidth": 0.9, "label": "greedy policy"},
+def band(steps: ArrayLike) -> Band:
+    """Return quartiles over runs, each a number of steps that some run took.
+
+    Parameters
+    ----------
+    steps
+        Steps, shape (runs, episodes); inf where a policy does not arrive.
+
+    Examples
+    --------
+    >>> band([[4.0], [6.0], [5.0], [9.0]])[:, 0]
+    array([4., 5., 6.])
+    """
+    quartiles: Band = np.quantile(np.asarray(steps, float), (0.25, 0.5, 0.75), axis=0, method="inverted_cdf")
+    return quartiles
+
+
+def _draw_bands(axes: Axes, bands: Mapping[str, Band], optimum: int | None) -> None:
+    looks: dict[str, tuple[str, Look]] = {
+        "training": ("training episodes", {"color": BLUE, "linewidth": 1.0}),
+        "greedy": ("greedy policy", {"color": INK, "linewidth": 0.9}),
     }
-    longest = max(len(curve) for curve in curves.values())
-    for name, curve in curves.items():
-        episodes = np.arange(1, len(curve) + 1) * (longest / len(curve))
-        axes.plot(episodes, np.asarray(curve, dtype=np.float64), gid=name, **looks.get(name, {"label": name}))
+    longest = max(quartiles.shape[1] for quartiles in bands.values())
+    for name, (low, middle, high) in bands.items():
+        label, look = looks[name]
+        episodes = np.arange(1, len(middle) + 1) * (longest / len(middle))
+        axes.plot(episodes, middle, gid=name, label=f"{label}: median", **look)
+        shade: Look = {"color": look["color"], "alpha": 0.2, "linewidth": 0}
+        capped = np.minimum(high, _BEYOND)  # what never arrives has no place on the axis
+        axes.fill_between(
+            episodes, low, capped, gid=f"{name}-band", label=f"{label}: interquartile range", **shade
+        )
     top = 10.0
     if optimum is not None:
-        look: Look = {"linestyle": (0, (4, 2)), "linewidth": 1.1, "zorder": 3}
-        axes.axhline(optimum, color=VERMILION, gid="optimum", label="optimum (breadth-first search)", **look)
+        dashed: Look = {"linestyle": (0, (4, 2)), "linewidth": 1.1, "zorder": 3}
+        axes.axhline(
+            optimum, color=VERMILION, gid="optimum", label="optimum (breadth-first search)", **dashed
+        )
         axes.annotate(
             str(optimum),
             (1, optimum),

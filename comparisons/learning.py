@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from hierarchy import GroundGraph
 from planners import MaxQ, flat_field, task_field
+from planners.compiled import CompiledMaxQ
 from worlds import Cell, Layout
 
 EPISODES: Final = 1200
@@ -18,9 +23,9 @@ Table = list[list[int | None]]
 """Steps to a subgoal, row by row of a room; None where the greedy policy does not arrive."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Curve:
-    """One panel of figure 12.
+    """One panel of figure 12, of all runs.
 
     Parameters
     ----------
@@ -29,15 +34,16 @@ class Curve:
     optimum
         The oracle's steps from there.
     training
-        Steps of each episode of learning.
+        Steps of each episode of learning, shape (runs, episodes).
     greedy
-        Steps of the greedy policy from `start` after each episode; None where it does not arrive.
+        Steps of the greedy policy from `start` after each episode, shape (runs, episodes); -1 where it does
+        not arrive.
     """
 
     start: Cell
     optimum: int
-    training: tuple[int, ...]
-    greedy: tuple[int | None, ...]
+    training: NDArray[np.int32]
+    greedy: NDArray[np.int64]
 
 
 class PairLearner:
@@ -56,17 +62,26 @@ class PairLearner:
         Names of the pair's marks.
     seed
         Every pair has a random stream of its own.
+    runs
+        How many runs learn at once: with `seed`, with the seed after it, and so on.
     """
 
-    def __init__(self, layout: Layout, grounded: GroundGraph, trigger: str, goal: str, seed: int) -> None:
+    def __init__(
+        self, layout: Layout, grounded: GroundGraph, trigger: str, goal: str, *, seed: int, runs: int = 1
+    ) -> None:
         self.layout = layout
         self.grounded = grounded
         self.trigger = trigger
         self.goal = goal
         pair = (list(layout.triggers).index(trigger), list(layout.goals).index(goal))
-        self.learner = MaxQ(grounded, (seed, *pair))
+        self.runs = CompiledMaxQ(grounded, [(seed + run, *pair) for run in range(runs)])
         self.first = layout.room(layout.start)
         self.second = frozenset(layout.cells) - layout.solid - self.first
+
+    @cached_property
+    def learner(self) -> MaxQ:
+        """The first run, as a learner that can be read and asked."""
+        return self.runs.run(0)
 
     def state(self, cell: Cell, doors: str) -> int:
         """Return the number of the pair's state with the robot in a cell."""
@@ -77,8 +92,9 @@ class PairLearner:
         """Carry out every phase of learning; return figure 12's curves if they are asked for."""
         found = self._learn_curves() if curves else {}
         for task in self.subtasks():
-            self.learner.train(self.grounded.place(task), self._starts(task), EPISODES)
-        self.learner.train(self.grounded.root, self._starts(self.subtasks()[0]), ROOT_EPISODES)
+            self.runs.train(self.grounded.place(task), self._starts(task), EPISODES)
+        self.runs.train(self.grounded.root, self._starts(self.subtasks()[0]), ROOT_EPISODES)
+        self.__dict__.pop("learner", None)  # the first run has learnt more since it was last asked for
         return found
 
     def step_table(self, task: str) -> Table:
@@ -102,22 +118,23 @@ class PairLearner:
         doors = (f"GotoDoor({name})" for name in self.layout.thresholds)
         return (f"GotoTrigger({self.trigger})", *doors, f"GotoGoal({self.goal})")
 
-    def wrong_grids(self) -> int:
-        """Count grids from which a subtask's greedy policy takes other than the oracle's steps."""
-        wrong = 0
+    def wrong_grids(self) -> NDArray[np.int64]:
+        """Count grids from which a subtask's greedy policy takes other than the oracle's steps, by run."""
+        wrong = np.zeros(len(self.runs.seeds), dtype=np.int64)
         for task in self.subtasks():
             place = self.grounded.place(task)
             distance = task_field(self.grounded.model, self.grounded.nodes[place]).distance
-            for at in self._starts(task):
-                wrong += self.learner.greedy_steps(place, at) != int(distance[at])
+            starts = self._starts(task)
+            wrong += (self.runs.greedy_steps(place, starts) != distance[starts]).sum(axis=1)
         return wrong
 
-    def wrong_starts(self) -> int:
-        """Count starts from which the whole task takes other than the fewest steps possible."""
+    def wrong_starts(self) -> NDArray[np.int64]:
+        """Count starts from which the whole task takes other than the fewest steps possible, by run."""
         root = self.grounded.root
         best = flat_field(self.grounded.model, self.grounded.nodes[root].terminal).distance
         starts = self._starts(f"GotoTrigger({self.trigger})")
-        return sum(self.learner.greedy_steps(root, at) != int(best[at]) for at in starts)
+        wrong: NDArray[np.int64] = (self.runs.greedy_steps(root, starts) != best[starts]).sum(axis=1)
+        return wrong
 
     def room(self, task: str) -> frozenset[Cell]:
         """Return the room that a subtask works in."""
@@ -134,15 +151,15 @@ class PairLearner:
         return {task + suffix: self._learn_from(task, start) for task, suffix, start in phases}
 
     def _learn_from(self, task: str, start: Cell) -> Curve:
-        """Learn a subtask from one grid, taking the greedy policy's steps after each episode."""
+        """Learn a subtask from one grid, taking the greedy policies' steps after each episode."""
         place, at = self.grounded.place(task), self.state(start, self._doors(task))
-        greedy: list[int | None] = []
+        greedy: list[NDArray[np.int64]] = []
         far = len(self.layout.cells)
-        training = self.learner.train(
-            place, [at], EPISODES, lambda: greedy.append(self.learner.greedy_steps(place, at, limit=far))
+        training = self.runs.train(
+            place, [at], EPISODES, lambda: greedy.append(self.runs.greedy_steps(place, [at], limit=far)[:, 0])
         )
         optimum = int(task_field(self.grounded.model, self.grounded.nodes[place]).distance[at])
-        return Curve(start, optimum, tuple(training), tuple(greedy))
+        return Curve(start, optimum, training, np.stack(greedy, axis=1))
 
     def _starts(self, task: str) -> list[int]:
         """Return the states in which a subtask runs and can end, grid by grid of its room."""

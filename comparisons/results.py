@@ -78,6 +78,8 @@ def results(spec: Spec, layout: Layout, grounded: GroundGraph, found: Findings) 
                 "optimal": pair.optimal,
                 "wrong_grids": pair.wrong_grids,
                 "wrong_starts": pair.wrong_starts,
+                "runs": pair.runs,
+                "optimal_runs": pair.optimal_runs,
             }
             for pair in found.pairs
         ],

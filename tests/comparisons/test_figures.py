@@ -92,7 +92,7 @@ def detections() -> Figure:
 DRAWINGS: dict[str, Callable[[], Figure]] = {
     "layout": lambda: figures.layout_figure(MAZE),
     "convergence": lambda: figures.convergence_figure(
-        {name: [30, 9, best] for name, best in OPTIMA.items()}, OPTIMA
+        {name: {"training": figures.band([[30, 9, best]])} for name, best in OPTIMA.items()}, OPTIMA
     ),
     "step_tables": lambda: figures.step_tables_figure(TABLES, {"GotoDoor(D1)": Cell(2, 4)}),
     "trajectories": trajectories,
@@ -118,7 +118,7 @@ def test_the_same_data_gives_the_same_files(name: str, tmp_path: Path) -> None:
 
 def test_every_figure_is_drawn_here() -> None:
     """A new figure function joins the test of equal bytes."""
-    assert {f"{name}_figure" for name in DRAWINGS} == set(figures.__all__) - {"save_figure"}
+    assert {f"{name}_figure" for name in DRAWINGS} == set(figures.__all__) - {"band", "save_figure"}
 
 
 def test_another_process_and_other_settings_give_the_same_svg() -> None:
@@ -169,27 +169,46 @@ def test_marks_stand_in_their_cells() -> None:
     assert axes.yaxis_inverted()
 
 
-def test_convergence_draws_every_curve_and_optimum() -> None:
-    """Five panels hold the training and greedy curves as given and a line at the optimum."""
+def test_convergence_draws_every_band_and_optimum() -> None:
+    """Five panels hold medians and quartiles of training and greedy steps, and a line at the optimum."""
+    runs = [[40.0, 9.0, 8.0, 7.0], [44.0, 9.0, 9.0, 8.0], [50.0, 9.5, 9.0, 9.0]]
     curves = {
-        name: {"training": [40.0, 9.0, 8.0, 7.0], "greedy": [9.0, best]} for name, best in OPTIMA.items()
+        name: {"training": figures.band(runs), "greedy": figures.band([[9.0, best], [np.inf, best]])}
+        for name, best in OPTIMA.items()
     }
     figure = figures.convergence_figure(curves, OPTIMA)
     panels = [axes for axes in figure.axes if axes.lines]
     assert [axes.get_title(loc="left") for axes in panels] == ["(a) a", "(b) b", "(c) c", "(d) d", "(e) e"]
     for axes, best in zip(panels, OPTIMA.values(), strict=True):
-        assert line(axes, "training") == [(1, 40), (2, 9), (3, 8), (4, 7)]
+        assert line(axes, "training") == [(1, 44), (2, 9), (3, 9), (4, 8)]
         assert line(axes, "greedy") == [(2, 9), (4, best)]
         assert {y for _, y in line(axes, "optimum")} == {best}
         assert axes.get_ylim() == (0, max(10, best + 2))
+        (shade,) = (patch for patch in axes.collections if patch.get_gid() == "training-band")
+        heights = {tuple(point) for point in shade.get_paths()[0].vertices.tolist()}
+        assert {(1, 40), (1, 50), (4, 7), (4, 9)} <= heights
 
 
-def test_a_curve_alone_is_the_training_curve() -> None:
-    """A plain sequence of steps is drawn as training, and six panels keep their legend."""
-    figure = figures.convergence_figure({str(i): [5, 4] for i in range(6)}, {})
+def test_training_may_stand_alone() -> None:
+    """Bands of training alone are drawn, and six panels keep their legend."""
+    training = figures.band([[5, 4]])
+    figure = figures.convergence_figure({str(i): {"training": training} for i in range(6)}, {})
     assert line(figure.axes[0], "training") == [(1, 5), (2, 4)]
     (legend,) = figure.legends
-    assert [text.get_text() for text in legend.get_texts()] == ["training episodes"]
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts == ["training episodes: median", "training episodes: interquartile range"]
+
+
+@given(st.lists(st.lists(st.integers(1, 30), min_size=3, max_size=3), min_size=1, max_size=9))
+def test_bands_are_quartiles_that_occurred(runs: list[list[int]]) -> None:
+    """Every quartile is some run's steps; a quarter, half and three quarters of the runs reach it."""
+    quartiles = figures.band(runs)
+    for episode, (low, middle, high) in enumerate(quartiles.T):
+        steps = [run[episode] for run in runs]
+        for share, value in ((0.25, low), (0.5, middle), (0.75, high)):
+            assert value in steps
+            assert sum(step <= value for step in steps) >= share * len(steps)
+            assert sum(step < value for step in steps) < share * len(steps) or share == 0
 
 
 def test_step_tables_hold_their_numbers_and_the_subgoal_in_red() -> None:

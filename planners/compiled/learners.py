@@ -1,0 +1,373 @@
+"""Compiled learners: many runs of a tabular learner at once, each the reference's run to the last bit."""
+
+from __future__ import annotations
+
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import ClassVar, Final, Generic, NamedTuple, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hierarchy import GroundGraph
+from planners.compiled.build import build
+from planners.compiled.schedules import tabulate
+from planners.compiled.shapes import find_shapes
+from planners.compiled.source import NO_SCHEDULE, STUCK, Kind, Writer
+from planners.compiled.tables import lay_out
+from planners.exploration import Boltzmann, Exploration, Explorer
+from planners.flat import FlatQ
+from planners.learner import EpisodeTooLongError, Learner, Settings, streams_of
+from planners.maxq import MaxQ
+from planners.maxq_q import MaxQQ
+from planners.schedules import by_task
+from worlds import Stream, UserError
+
+SCHEDULED: Final = 4096
+"""Episodes that the schedules' tables hold at first."""
+_SHARED: Final = 1000
+"""Episodes, of all runs together, from which on threads pay."""
+
+L = TypeVar("L", bound=Learner)
+Steps = NDArray[np.int32]
+
+
+class Compiled(ABC, Generic[L]):
+    """Runs of one learner, one for each seed, by a kernel that is generated for the ground graph.
+
+    A run is the reference learner's run with the same seed, to the last bit: alone or among others, on any
+    number of threads. Only Boltzmann exploration takes exponentials, which may differ in the last bit
+    between numba and Python; its values agree within 1e-9 for as long as no choice falls the other way.
+
+    Parameters
+    ----------
+    grounded
+        The ground graph, with its world's model.
+    seeds
+        The seed of each run, which names its random stream as it does for the reference.
+    settings
+        Schedules, discount and tie break. Exploration is `Exploration` or `Boltzmann`; all-states updating
+        is for the reference alone.
+    threads
+        How many threads share the runs; left out, as many as the process may use at once.
+
+    Attributes
+    ----------
+    grounded
+        What is learnt on: the ground graph, or for flat Q-learning its flattened one.
+    values
+        All that has been learnt, shape (runs, values), laid out as `tables` says.
+    episodes
+        Episodes of each node since its schedules began, shape (runs, nodes).
+    steps
+        Primitive steps of learning so far, shape (runs,).
+
+    Raises
+    ------
+    UserError
+        If there is no seed, or the settings ask for what is not compiled.
+    """
+
+    reference: ClassVar[type[Learner]]
+    kind: ClassVar[Kind]
+
+    def __init__(
+        self,
+        grounded: GroundGraph,
+        seeds: Sequence[Sequence[int]],
+        settings: Settings | None = None,
+        *,
+        threads: int | None = None,
+    ) -> None:
+        if not seeds:
+            raise UserError("a compiled learner needs a seed for each run, such as seeds=[(0,), (1,)]")
+        self.settings = settings or Settings()
+        self.seeds = [tuple(seed) for seed in seeds]
+        self.threads = threads or len(os.sched_getaffinity(0))
+        self._given = grounded
+        self.grounded = self._reference(0).grounded
+        nodes = self.grounded.nodes
+        explorers = by_task(self.grounded, self.settings.exploration, self.settings.explorations)
+        rates = by_task(self.grounded, self.settings.rate, self.settings.rates)
+        _refuse(self.settings, explorers)
+        self._schedules = list(zip(rates, explorers, strict=True))
+        self._scheduled = SCHEDULED
+        self.tables = lay_out(self.grounded, flat=self.kind == "flat-q")
+        boltzmann = [isinstance(explorer, Boltzmann) for explorer in explorers]
+        shapes = find_shapes(self.grounded, self.tables, boltzmann, pseudo_rewards=self.kind != "maxq-0")
+        writer = Writer(
+            self.kind,
+            float(self.settings.gamma),
+            float(self.settings.tie),
+            len(grounded.model.actions),
+            self.tables,
+            shapes,
+        )
+        self._kernel = build(writer.source())
+        self._told = shapes.told
+        outcomes = self.tables.outcomes
+        self._world = (
+            *(self.tables.words, self.tables.rows, shapes.links),
+            *(outcomes.first, outcomes.after, outcomes.reward, outcomes.up_to),
+        )
+        self._room = max(len(node.calls) for node in nodes)
+        runs = len(self.seeds)
+        self.values = np.zeros((runs, self.tables.size * (2 if self.kind == "maxq-q" else 1)))
+        self.episodes = np.zeros((runs, len(nodes)), dtype=np.int64)
+        self.steps = np.zeros(runs, dtype=np.int64)
+        streams = [streams_of(seed) for seed in self.seeds]
+        self._learning = _Streams.of([random for random, _ in streams])
+        self._following = _Streams.of([chance for _, chance in streams])
+
+    @abstractmethod
+    def _fill(self, learner: L, values: NDArray[np.float64]) -> None:
+        """Put one run's values into a reference learner."""
+
+    def train(
+        self,
+        task: int,
+        starts: Sequence[int],
+        episodes: int,
+        after_each: Callable[[], None] | None = None,
+    ) -> Steps:
+        """Run episodes of a task in every run, each from a random one of `starts`.
+
+        The task's rate and exploration start afresh; what it and its children have learnt stays. On an
+        error nothing has been learnt.
+
+        Parameters
+        ----------
+        task
+            The task's place in the ground graph.
+        starts
+            States to start from.
+        episodes
+            Episodes of each run.
+        after_each
+            Called after every episode of all runs, to take a measurement.
+
+        Returns
+        -------
+        ndarray
+            Primitive steps of each episode, shape (runs, episodes).
+
+        Raises
+        ------
+        EpisodeTooLongError
+            If an episode passes the settings' `max_steps`.
+        UserError
+            If the task comes to a state in which it has no child to call, or there is nothing to start from.
+        """
+        if not len(starts):
+            raise UserError(f"task {self.grounded.nodes[task].name} has no states to start from; give starts")
+        self.episodes[:, task] = 0
+        steps = np.zeros((len(self.seeds), episodes), dtype=np.int32)
+        begin = np.asarray(starts, dtype=np.int64)
+        if after_each is None:
+            self._learn(task, begin, steps)
+            return steps
+        for episode in range(episodes):
+            one = np.zeros((len(self.seeds), 1), dtype=np.int32)
+            self._learn(task, begin, one)
+            steps[:, episode] = one[:, 0]
+            after_each()
+        return steps
+
+    def greedy_steps(self, task: int, states: Sequence[int], limit: int = 1000) -> NDArray[np.int64]:
+        """Return the primitive steps of the greedy policies.
+
+        Parameters
+        ----------
+        task
+            The task's place in the ground graph.
+        states
+            States to start from.
+        limit
+            Steps after which a policy is given up.
+
+        Returns
+        -------
+        ndarray
+            Steps from each state, shape (runs, states); -1 past `limit`.
+        """
+        steps = np.zeros((len(self.seeds), len(states)), dtype=np.int64)
+        begin = np.asarray(states, dtype=np.int64)
+        told = np.array(self._told[task], dtype=np.int64)
+
+        def follow(low: int, high: int, trouble: NDArray[np.int64]) -> int:
+            status: int = self._kernel.follow(
+                told, low, high, *self._following.arrays, self.values, begin, limit, steps,
+                *self._world, trouble, self._room,
+            )  # fmt: skip
+            return status
+
+        self._heed(self._share(follow, steps.size))
+        return steps
+
+    def run(self, number: int) -> L:
+        """Return a reference learner that has learnt what a run has, and would go on as it does."""
+        learner = self._reference(number)
+        self._fill(learner, self.values[number])
+        learner.episodes = self.episodes[number].tolist()
+        learner.steps = int(self.steps[number])
+        learner.random.drawn = int(self._learning.drawn[number])
+        learner.chance.drawn = int(self._following.drawn[number])
+        return learner
+
+    def _reference(self, number: int) -> L:
+        learner = self.reference(self._given, self.seeds[number], self.settings)
+        return cast(L, learner)
+
+    def _learn(self, task: int, starts: NDArray[np.int64], steps: Steps) -> None:
+        """Run the episodes that `steps` has room for; on an error leave everything as it was."""
+        told = np.array(self._told[task], dtype=np.int64)
+        before = self.values.copy(), self.episodes.copy(), self._learning.drawn.copy()
+        while True:
+            at, schedule = tabulate(self._schedules, self._scheduled)
+
+            def learn(low: int, high: int, trouble: NDArray[np.int64]) -> int:
+                status: int = self._kernel.learn(
+                    told, low, high, *self._learning.arrays, self.values, self.episodes,
+                    at, schedule, self._scheduled, starts, steps.shape[1], self.settings.max_steps, steps,  # noqa: B023
+                    *self._world, trouble, self._room,
+                )  # fmt: skip
+                return status
+
+            ends = self._share(learn, steps.size)
+            if all(end.status == 0 for end in ends):
+                self.steps += steps.sum(axis=1)
+                return
+            self.values[:], self.episodes[:], self._learning.drawn[:] = before
+            if not any(end.status == NO_SCHEDULE for end in ends):
+                self._heed(ends)
+            self._scheduled *= 2
+
+    def _share(self, work: Callable[[int, int, NDArray[np.int64]], int], episodes: int) -> list[_End]:
+        """Do the work of all runs, `threads` at a time."""
+        runs = len(self.seeds)
+        parts = min(runs, 4 * self.threads) if self.threads > 1 and episodes >= _SHARED else 1
+        bounds = [runs * part // parts for part in range(parts + 1)]
+
+        def one(part: int) -> _End:
+            trouble = np.zeros(4, dtype=np.int64)
+            return _End(work(bounds[part], bounds[part + 1], trouble), *trouble.tolist())
+
+        if parts == 1:
+            return [one(0)]
+        with ThreadPoolExecutor(self.threads) as pool:
+            return list(pool.map(one, range(parts)))
+
+    def _heed(self, ends: Sequence[_End]) -> None:
+        """Raise what the first failure says."""
+        for end in ends:
+            if end.status == STUCK:
+                self._reference(end.run).greedy(end.task, end.state)  # raises
+            if end.status < 0:
+                where = f"run {end.run}, episode {end.episode}"
+                raise EpisodeTooLongError(
+                    f"no end after {self.settings.max_steps} primitive steps in {where}"
+                )
+
+
+class _End(NamedTuple):
+    """How a kernel came back, and where it was if it failed."""
+
+    status: int
+    task: int
+    state: int
+    run: int
+    episode: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Streams:
+    """One random stream a run, as arrays of shape (runs,)."""
+
+    keys: NDArray[np.uint64]
+    drawn: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, streams: Sequence[Stream]) -> _Streams:
+        keys = np.array([stream.key for stream in streams], dtype=np.uint64)
+        return cls(keys, np.zeros(len(streams), dtype=np.int64))
+
+    @property
+    def arrays(self) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
+        return self.keys, self.drawn
+
+
+class CompiledMaxQ(Compiled[MaxQ]):
+    """Compiled `MaxQ`: see `Compiled`.
+
+    Examples
+    --------
+    >>> from hierarchy import ground, two_rooms
+    >>> from worlds import load_layout, maze_model
+    >>> maze = load_layout("two_rooms")
+    >>> grounded = ground(two_rooms(maze), maze_model(maze))
+    >>> goto = grounded.place("GotoTrigger(T4)")
+    >>> start = grounded.model.index.number((maze.start, maze.triggers["T4"], maze.goals["G2"], "closed"))
+    >>> learner = CompiledMaxQ(grounded, seeds=[(seed,) for seed in range(100)])
+    >>> steps = learner.train(goto, [start], episodes=300)
+    >>> steps.shape, (learner.greedy_steps(goto, [start]) == 6).all()
+    ((100, 300), np.True_)
+    >>> steps[1].tolist() == MaxQ(grounded, seed=(1,)).train(goto, [start], episodes=300)
+    True
+    """
+
+    reference = MaxQ
+    kind = "maxq-0"
+
+    def _fill(self, learner: MaxQ, values: NDArray[np.float64]) -> None:
+        _fill_maxq(self, learner, values)
+
+
+class CompiledMaxQQ(Compiled[MaxQQ]):
+    """Compiled `MaxQQ`: see `Compiled`."""
+
+    reference = MaxQQ
+    kind = "maxq-q"
+
+    def _fill(self, learner: MaxQQ, values: NDArray[np.float64]) -> None:
+        outer, inner = np.split(values, 2)
+        _fill_maxq(self, learner, outer)
+        for task, k, rows in _places(learner.inner_completion):
+            learner.inner_completion[task][k] = self.tables.table(inner, task, k, rows).tolist()
+
+
+class CompiledFlatQ(Compiled[FlatQ]):
+    """Compiled `FlatQ`: see `Compiled`."""
+
+    reference = FlatQ
+    kind = "flat-q"
+
+    def _fill(self, learner: FlatQ, values: NDArray[np.float64]) -> None:
+        for task, k, rows in _places(learner.table):
+            learner.table[task][k] = self.tables.table(values, task, k, rows).tolist()
+
+
+def _fill_maxq(compiled: Compiled[L], learner: MaxQ, values: NDArray[np.float64]) -> None:
+    for task, k, rows in _places(learner.completion):
+        learner.completion[task][k] = compiled.tables.table(values, task, k, rows).tolist()
+    for action, column in enumerate(compiled.tables.columns):
+        learner.reward[action] = values[column.base : column.base + column.count].tolist()
+
+
+def _places(table: Sequence[Sequence[Sequence[float]]]) -> list[tuple[int, int, int]]:
+    """Return task, call and number of rows of every table."""
+    return [(task, k, len(rows)) for task, calls in enumerate(table) for k, rows in enumerate(calls)]
+
+
+def _refuse(settings: Settings, explorers: Sequence[Explorer]) -> None:
+    """Refuse settings that no kernel knows."""
+    if settings.all_states:
+        raise UserError("all-states updating is not compiled; use the reference learner, such as MaxQ")
+    for explorer in explorers:
+        if type(explorer) not in {Exploration, Boltzmann}:
+            raise UserError(
+                f"exploration by {type(explorer).__name__} is not compiled; give Exploration or Boltzmann, "
+                "or use the reference learner, such as MaxQ"
+            )
