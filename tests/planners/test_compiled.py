@@ -22,7 +22,17 @@ from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ, CompiledMax
 from planners.compiled.build import FOLDER, build
 from planners.learner import EpisodeTooLongError
 from planners.maxq import MaxQ
-from worlds import StateIndex, Stream, TransitionModel, UserError, Variable, jit, load_layout, maze_model
+from worlds import (
+    StateIndex,
+    Stream,
+    TransitionModel,
+    UserError,
+    Variable,
+    jit,
+    load_layout,
+    maze_model,
+    parse_layout,
+)
 from worlds.hdg import LandmarkMaze, landmark_model
 from worlds.taxi import taxi_model
 
@@ -343,6 +353,23 @@ def test_without_a_place_for_the_cache_all_is_well(tmp_path: Path) -> None:
     taken.write_text("no folder")
     _try(taken / "below")
     assert list(tmp_path.iterdir()) == [taken]
+
+
+def test_graphs_of_one_form_share_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A maze of another size takes the kernel of the paper's, and learns right with it."""
+    sources = []
+
+    def watched(source: str) -> Any:
+        sources.append(source)
+        return build(source)
+
+    monkeypatch.setattr(learners, "build", watched)
+    rows = "grid", ". . T1 | . G1", ". T2 . : D1 .", "T3 . . : D2 G2", "T4 . . | G3 G4", "start 0,0"
+    maze = parse_layout("\n".join((*rows, "trigger T1", "goal G1")))
+    small = ground(two_rooms(maze), maze_model(maze))
+    CompiledMaxQ(maze_graph(), [(1,)])
+    agree(CompiledMaxQ, small, Settings(), episodes=30)
+    assert sources[0] == sources[1]
 
 
 def test_a_module_is_built_once() -> None:
