@@ -31,7 +31,12 @@ def register() -> None:
     """
     for name, arguments in ENVIRONMENTS.items():
         if name not in gymnasium.registry:
-            gymnasium.register(id=name, entry_point="worlds.env:MazeEnv", kwargs=arguments)
+            gymnasium.register(
+                id=name,
+                entry_point="worlds.quick_env:QuickMazeEnv",
+                vector_entry_point="worlds.vector_env:MazeVectorEnv",
+                kwargs=arguments,
+            )
 
 
 register()
