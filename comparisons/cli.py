@@ -6,8 +6,9 @@ import sys
 from collections.abc import Sequence
 from importlib.metadata import version
 from pathlib import Path
+from typing import Annotated
 
-from cyclopts import App, CycloptsError
+from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
 from worlds.errors import UserError
@@ -107,6 +108,49 @@ def draw(graph: str, /, *, world: str | None = None, out: Path = Path()) -> int:
 
     for path in draw_graph(graph, world, out):
         print(path)
+    return 0
+
+
+@app.command
+def maze(
+    *,
+    rows: int,
+    cols: int,
+    seed: int = 0,
+    out: Path | None = None,
+    rooms: Annotated[tuple[int, int], Parameter(negative_iterable=())] = (1, 2),
+    doors: int = 2,
+    triggers: int = 4,
+    goals: int = 4,
+    obstacles: int = 6,
+) -> int:
+    """Draw a maze from a seed: rooms, passages, doors, triggers, goals and obstacles. It can be played.
+
+    Parameters
+    ----------
+    rows
+        Rows of cells.
+    cols
+        Columns of cells.
+    seed
+        Names the maze: the same seed and numbers give the same one.
+    out
+        File to write, such as large.maze; it must not exist. Left out, the maze is printed.
+    rooms
+        Rows and columns of rooms; the wall with the doors stands in the middle of the columns.
+    doors
+        Number of doors that the trigger opens.
+    triggers
+        Number of candidate triggers, all before the doors.
+    goals
+        Number of candidate goals, all behind the doors.
+    obstacles
+        Number of cubes and spheres that appear in the example run.
+    """
+    from comparisons.maze_command import draw_maze
+
+    numbers = {"doors": doors, "triggers": triggers, "goals": goals, "obstacles": obstacles}
+    print(draw_maze(out, rows, cols, seed, rooms=rooms, **numbers), end="")
     return 0
 
 

@@ -13,10 +13,12 @@ from comparisons.dynamic import Tally
 from comparisons.experiment import Example, Experiment, Learnt, Spec
 from comparisons.learning import Table
 from comparisons.robot import Run
+from comparisons.snapshots import Shortfall, SnapshotTally, judge_all
 from hierarchy import GroundGraph, ValueCounts
 from perception.accuracy import Accuracy
 from perception.pushing import Agreement
 from planners import Gap
+from planners.dynamics import Fault, Reading
 from worlds import ACTIONS, Layout, Outcome
 
 
@@ -33,6 +35,7 @@ class Findings:
     example: Example
     dynamic: Tally
     globally_optimal: int
+    snapshots: dict[Reading, SnapshotTally]
     local_rule: dict[Outcome, int]
 
 
@@ -51,6 +54,7 @@ def find(experiment: Experiment) -> Findings:
         example=experiment.example(),
         dynamic=dynamic,
         globally_optimal=dynamic.globally_optimal(experiment.oracle),
+        snapshots=judge_all(experiment.oracle, dynamic.verdicts),
         local_rule=experiment.local_rule(),
     )
 
@@ -91,6 +95,7 @@ def results(spec: Spec, layout: Layout, grounded: GroundGraph, found: Findings) 
             "with_obstacles": [list(cell) for cell in found.example.with_obstacles.cells],
         },
         "dynamic": _dynamic(found),
+        "snapshots": _snapshots(layout, grounded, found),
     }
 
 
@@ -156,4 +161,33 @@ def _dynamic(found: Findings) -> dict[str, Any]:
         "steps": tally.steps,
         "looks": tally.looks,
         "misread": tally.misread,
+    }
+
+
+def _snapshots(layout: Layout, grounded: GroundGraph, found: Findings) -> dict[str, Any]:
+    return {
+        reading.value: {
+            "affordances": tally.asked,
+            **{fault.value: tally.faults[fault] for fault in Fault},
+            "optimal_in_all_that_it_holds_optimal": tally.alike,
+            "steps_lost": tally.lost,
+            "most_steps_lost": tally.most,
+            "smallest": None if tally.smallest is None else _shortfall(layout, grounded, tally.smallest),
+        }
+        for reading, tally in found.snapshots.items()
+    }
+
+
+def _shortfall(layout: Layout, grounded: GroundGraph, found: Shortfall) -> dict[str, Any]:
+    state, judgement = found.state, found.judgement
+    assert found.task is not None, "the robot was carrying out a task"
+    assert judgement is not None, "and its affordance was judged"
+    return {
+        "subtask": grounded.nodes[found.task].name,
+        "robot": str(layout.cells[state.robot]),
+        "cubes": [str(layout.cells[cell]) for cell in sorted(state.cubes)],
+        "spheres": [str(layout.cells[cell]) for cell in sorted(state.spheres)],
+        "snapshot": [ACTIONS[action] for action in sorted(judgement.snapshot)],
+        "optimal": [ACTIONS[action] for action in sorted(judgement.exact)],
+        "loss": judgement.loss,
     }

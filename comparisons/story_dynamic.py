@@ -12,9 +12,11 @@ from comparisons.figures import counterexample_figure, trajectories_figure
 from comparisons.figures_routes import drawn
 from comparisons.report import Replay, ReplayFrame, Section, Table
 from comparisons.results import Findings, affordances
+from comparisons.snapshots import SnapshotTally
 from comparisons.story_parts import Part, share
 from hierarchy import GroundGraph
 from planners import Proof
+from planners.dynamics import Fault, Reading
 from worlds import ACTIONS, Cell, Layout, MazeState, Outcome, step
 
 
@@ -71,6 +73,7 @@ def dynamic(experiment: Experiment, found: Findings) -> Part:
         f"replanning {tally.outcomes[Outcome.REACHED]}. Of the {tally.outcomes[Outcome.NO_ROUTE]} episodes "
         f"that end with no route left, {tally.hopeless} have none in the whole maze, whatever the subtasks."
     )
+    snapshots = _snapshot_text(found)
     ends = tuple((outcome.value, tally.outcomes[outcome], alone[outcome]) for outcome in Outcome)
     looks = ((tally.looks, tally.misread, share(tally.misread, tally.looks)),)
     situations = tuple(
@@ -78,17 +81,48 @@ def dynamic(experiment: Experiment, found: Findings) -> Part:
         for situation, (asked, optimal) in tally.local_rule_by().items()
     )
     tables = (
+        _snapshot_table(found),
         Table("The local rule by situation", ("obstacle", "affordances", "optimal", "share"), situations),
         Table("How the episodes ended", ("end", "replanning", "local rule, told every shape"), ends),
         Table("Looks ahead while replanning", ("looks", "misread", "share"), looks),
     )
     refuted = tally.counterexample()
     if refuted is None:
-        return Part(Section("Dynamic affordances: random episodes", (how, rule, left), (), tables))
+        return Part(Section("Dynamic affordances: random episodes", (how, rule, snapshots, left), (), tables))
     caption = "A counter-example to the local rule: the obstacles that the robot knew of, and both ways on."
     captions = (("counterexample", caption),)
-    section = Section("Dynamic affordances: random episodes", (how, rule, left), captions, tables)
+    section = Section("Dynamic affordances: random episodes", (how, rule, snapshots, left), captions, tables)
     return Part(section, {"counterexample": _counterexample(experiment, refuted)})
+
+
+def _snapshot_text(found: Findings) -> str:
+    """Say how often a search that lets no sphere move would have been right."""
+    standing = found.snapshots[Reading.STANDING]
+    return (
+        f"The robot knew of a sphere in {standing.asked} of them. There a snapshot, in which every sphere "
+        "stays where it is seen, need not show the optimum: a pushed sphere rolls, may close the way that it "
+        "was pushed along, or may open another. Read as they stand (passable in the directions in which they "
+        f"could roll just now), spheres let the snapshot miss an optimal first action {_missed(standing)} "
+        f"times, {standing.faults[Fault.TRAP]} of them for one that leaves no way."
+    )
+
+
+def _missed(tally: SnapshotTally) -> int:
+    return tally.asked - tally.faults[Fault.NONE]
+
+
+def _snapshot_table(found: Findings) -> Table:
+    rows = tuple(
+        (
+            reading.value,
+            *(tally.faults[fault] for fault in Fault),
+            share(_missed(tally), tally.asked),
+            tally.lost,
+        )
+        for reading, tally in found.snapshots.items()
+    )
+    head = ("spheres", *(fault.value for fault in Fault), "not optimal", "steps lost")
+    return Table("Snapshots, in which no sphere moves, against the exact planner", head, rows)
 
 
 def replay(experiment: Experiment, found: Findings) -> Replay:

@@ -14,11 +14,14 @@ def summarise(results: dict[str, Any]) -> str:
     outcomes = ", ".join(f"{name}: {n}" for name, n in dynamic["outcomes"].items())
     share = f"{100 * seen['accuracy']:.1f} %"
     proved = f"replanning {dynamic['optimal_replanning']}, local rule {dynamic['optimal_local_rule']}"
+    snapshots = ", ".join(f"{reading} {tally['optimal']}" for reading, tally in results["snapshots"].items())
+    spheres = max(tally["affordances"] for tally in results["snapshots"].values())
     lines = (
         f"pairs learnt to optimality: {optimal} of {len(pairs)}",
         f"perception ({seen['backend']}): {share} of {seen['frames']} fresh frames told right",
         f"example run: {shown}",
         f"proved optimal of {dynamic['affordances']} affordances in {dynamic['episodes']} episodes: {proved}",
+        f"optimal by a snapshot, of {spheres} affordances with a sphere known, spheres read: {snapshots}",
         f"ends: {outcomes}",
     )
     return "\n".join(lines)

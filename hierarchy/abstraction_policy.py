@@ -201,7 +201,7 @@ def _mixed(
     classes, places = np.unique(index.project(reads), return_inverse=True)
     odds = np.zeros((len(node.calls), index.size))
     for k, call in enumerate(node.calls):
-        drawn = np.array([stream.between(0.5, 1.5) for _ in range(classes.size)])
+        drawn = 0.5 + stream.uniforms(classes.size)
         sure = call.available & np.isfinite(exits[call.child].value)
         odds[k, sure] = drawn[places.reshape(-1)][sure]
     total = odds.sum(axis=0)
@@ -223,12 +223,13 @@ def _best(node: GroundTask, exits: Sequence[Exits], value: Values) -> Values:
     """Return the values of a task's best policy, from those of some policy of it, by value iteration."""
     steps = []
     for call in node.calls:
-        runs = call.available & np.isfinite(exits[call.child].value)
-        steps.append((runs, np.where(runs, exits[call.child].value, -np.inf), exits[call.child].kernel))
+        child = exits[call.child]
+        runs = np.flatnonzero(call.available & np.isfinite(child.value))
+        steps.append((runs, child.value[runs], child.kernel[runs]))
     for _ in range(_SWEEPS):
         better = value.copy()
         for runs, earned, kernel in steps:
-            better[runs] = np.maximum(better[runs], (earned + kernel @ value)[runs])
+            better[runs] = np.maximum(better[runs], earned + kernel @ value)
         known = np.isfinite(value)
         least = 1e-12 * np.maximum(1.0, np.abs(value[known]))
         if (np.isfinite(better) == known).all() and (better[known] - value[known] <= least).all():

@@ -183,6 +183,7 @@ class _Builder:
         self.model = model
         self.nodes = [_primitive(model, place) for place in range(len(model.actions))]
         self.places: dict[tuple[str, Binding], int] = {(a, ()): i for i, a in enumerate(model.actions)}
+        self.projections: dict[tuple[str, ...], NDArray[np.int64]] = {}  # long, so shared
 
     def add(self, task: Task, binding: Binding) -> int:
         """Add a ground task below its children, unless it is there, and return its place."""
@@ -224,7 +225,9 @@ class _Builder:
             available = guard & self.model.must_reach(stays)[:, child]
         relevant = task.uses if call.relevant is None else call.relevant
         rows = int(np.prod([len(index.variable(name)) for name in relevant], dtype=np.int64))
-        return GroundCall(child, available, relevant, index.project(relevant), rows, call)
+        if relevant not in self.projections:
+            self.projections[relevant] = index.project(relevant)
+        return GroundCall(child, available, relevant, self.projections[relevant], rows, call)
 
     def _bindings(self, call: Call, values: Mapping[str, Constant]) -> Iterator[tuple[Binding, Mask]]:
         """Yield every binding of a call's child, and the states in which it is meant."""

@@ -141,19 +141,26 @@ class _Problem:
         no end.
         """
         region: Mask = np.logical_or.reduce(allowed)
+        before = csc_array(self.kernel)  # what may lead into a state, by its column
         while True:
             stays = self._through((~(region | self.terminal)).astype(float)) == 0
             allowed = allowed & stays & region
             choice: NDArray[np.int64] = np.full(self.terminal.size, -1)
             done, fresh = self.terminal.copy(), self.terminal.copy()
             into = allowed & self.leaking
+            found = np.flatnonzero(into.any(axis=0) & ~done)
+            entered = _sources(before, np.flatnonzero(fresh))
             while True:
-                into |= allowed & (self._through(fresh.astype(float)) > 0)
-                fresh = into.any(axis=0) & ~done
-                if not fresh.any():
+                choices, states = np.divmod(entered, self.terminal.size)
+                possible = allowed[choices, states]
+                into[choices[possible], states[possible]] = True
+                found = np.unique(np.concatenate([found, states[possible]]))
+                found = found[~done[found]]
+                if not found.size:
                     break
-                choice[fresh] = into.argmax(axis=0)[fresh]
-                done |= fresh
+                choice[found] = into[:, found].argmax(axis=0)
+                done[found] = True
+                entered = _sources(before, found)
             if (done & ~self.terminal == region).all():
                 return region, choice
             region = done & ~self.terminal
@@ -184,3 +191,12 @@ class _Problem:
     def quality(self, value: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the value of each choice when all later ones follow a policy, (choices, states)."""
         return np.where(self.usable, self.reward + self._through(value), -np.inf)
+
+
+def _sources(before: csc_array[np.float64], states: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the rows that have a chance of leading into some states, from the matrix by its columns."""
+    first, count = before.indptr[states], before.indptr[states + 1] - before.indptr[states]
+    within = np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    at = np.repeat(first, count) + within
+    rows: NDArray[np.int64] = before.indices[at[before.data[at] > 0]].astype(np.int64)
+    return rows

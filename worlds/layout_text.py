@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import NoReturn
 
 from worlds.errors import LayoutError, UserError, nearest, suggest
-from worlds.layout import KINDS, SIZES, Appears, Cell, Edge, Kind, Layout, Obstacle, Size, edge
+from worlds.layout import KINDS, SIZES, Appears, Cell, Kind, Layout, Obstacle, Size
 from worlds.layout_checks import layout_faults
+from worlds.layout_grid import Grid, Line, begins_row
 
-_MARK = re.compile(r"[TGD][A-Za-z0-9_]*")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}")
 _KEYS = ("name", "grid", "start", "trigger", "goal", "chosen", "obstacles")
@@ -75,49 +75,43 @@ def parse_layout(text: str, source: str = "layout") -> Layout:
 @dataclass
 class _Parser:
     source: str
-    lines: dict[str, int] = field(default_factory=dict)  # where each key or mark was read
-    grid: list[tuple[int, list[str]]] = field(default_factory=list)
+    lines: dict[str, int] = field(default_factory=dict)  # where each key, mark and obstacle was read
     values: dict[str, list[str]] = field(default_factory=dict)
-    marks: dict[str, Cell] = field(default_factory=dict)
-    solid: set[Cell] = field(default_factory=set)
-    walls: set[Edge] = field(default_factory=set)
-    doors: set[Edge] = field(default_factory=set)
-    obstacles: list[Obstacle] = field(default_factory=list)
+    grid: Grid = field(init=False)
 
     def fail(self, line: int | None, problem: str, mend: str) -> NoReturn:
         raise LayoutError(self.source, line, problem, mend)
 
     def parse(self, text: str) -> Layout:
-        obstacle_lines = self._split(text)
-        rows, cols = self._read_grid()
-        start = self._cell_of("start", rows, cols)
+        grid_lines, obstacle_lines = self._split(text)
+        self.grid = grid = self._read_grid(grid_lines)
+        start = self._cell(*self._single("start"))
         trigger, goal = self._mark_of("trigger", "T"), self._mark_of("goal", "G")
-        for number, words in obstacle_lines:
-            self.obstacles.append(self._obstacle(number, words, rows, cols))
+        obstacles = tuple(self._obstacle(number, words) for number, words in obstacle_lines)
         layout = Layout(
             name=" ".join(self.values.get("name", [])) or Path(self.source).stem,
-            rows=rows,
-            cols=cols,
-            solid=frozenset(self.solid),
-            walls=frozenset(self.walls),
-            doors=frozenset(self.doors),
-            triggers=self._marked("T"),
-            goals=self._marked("G"),
-            thresholds=self._marked("D"),
+            rows=len(grid.rows),
+            cols=grid.cols,
+            solid=frozenset(grid.solid),
+            walls=frozenset(grid.walls),
+            doors=frozenset(grid.doors),
+            triggers=grid.marked("T"),
+            goals=grid.marked("G"),
+            thresholds=grid.marked("D"),
             start=start,
             trigger=trigger,
             goal=goal,
-            obstacles=tuple(self.obstacles),
-            chosen=self._chosen(),
+            obstacles=obstacles,
+            chosen=self._chosen(obstacles),
         )
-        for fault in layout_faults(layout, self.lines, [number for number, _ in self.grid]):
+        for fault in layout_faults(layout, self.lines, grid.rows):
             self.fail(*fault)
         return layout
 
-    def _split(self, text: str) -> list[tuple[int, list[str]]]:
-        """Sort lines into the grid, `key value` lines and obstacle lines."""
+    def _split(self, text: str) -> tuple[list[Line], list[Line]]:
+        """Keep the `key value` lines, and return the grid's lines and the obstacles'."""
         section = ""
-        obstacle_lines: list[tuple[int, list[str]]] = []
+        below: dict[str, list[Line]] = {heading: [] for heading in _HEADINGS}
         for number, raw in enumerate(text.splitlines(), start=1):
             words = [] if raw.lstrip().startswith("#") else raw.split()
             if not words:
@@ -135,90 +129,44 @@ class _Parser:
                 self.lines[section] = number
                 self.values[section] = words[1:]
             elif section in _HEADINGS and not _misspelt_key(words, section):
-                (self.grid if section == "grid" else obstacle_lines).append((number, words))
+                below[section].append((number, words))
             else:
                 self.fail(number, f"unknown key {words[0]!r}", suggest(words[0], _KEYS))
-        return obstacle_lines
+        return below["grid"], below["obstacles"]
 
-    def _read_grid(self) -> tuple[int, int]:
-        if not self.grid:
+    def _read_grid(self, rows: list[Line]) -> Grid:
+        grid = Grid(self.source)
+        if not rows:
             self.fail(self.lines.get("grid"), "the layout has no grid", "add 'grid' and its rows below it")
-        width = 0
-        for row, (number, words) in enumerate(self.grid):
-            col = self._read_row(number, row, words)
-            width = width or col
-            if col != width:
-                self.fail(
-                    number,
-                    f"ragged rows: this row has {col} cells, the first has {width}",
-                    "give every row the same number of cells",
-                )
+        grid.read(rows)
+        self.lines.update(grid.lines)
         for mark, meaning in (("T", "trigger"), ("G", "goal")):
-            if not self._marked(mark):
+            if not grid.marked(mark):
                 self.fail(
                     self.lines["grid"],
                     f"missing mark: no {meaning} in the grid",
                     f"mark a cell {mark}1 in place of '.'",
                 )
-        return len(self.grid), width
+        return grid
 
-    def _read_row(self, number: int, row: int, words: list[str]) -> int:
-        """Read one row of the grid and return its number of cells."""
-        col = 0
-        between = ""
-        for word in words:
-            if word in ("|", ":"):
-                if col == 0 or between:
-                    self.fail(
-                        number, f"{word!r} does not stand between two cells", "put a cell on either side"
-                    )
-                between = word
-                continue
-            cell = Cell(row, col)
-            if word == "X":
-                self.solid.add(cell)
-            elif _MARK.fullmatch(word):
-                if word in self.marks:
-                    self.fail(
-                        number,
-                        f"doubled mark {word} (first: line {self.lines[word]})",
-                        "rename or remove one of the two",
-                    )
-                self.marks[word] = cell
-                self.lines[word] = number
-            elif word != ".":
-                self.fail(
-                    number,
-                    f"unknown cell {word!r}",
-                    "write '.', 'X' (solid), or a mark that begins with T, G or D; separate cells by blanks",
-                )
-            if between:
-                (self.walls if between == "|" else self.doors).add(edge(Cell(row, col - 1), cell))
-                between = ""
-            col += 1
-        if between:
-            self.fail(number, f"{between!r} does not stand between two cells", "put a cell on either side")
-        return col
-
-    def _marked(self, letter: str) -> dict[str, Cell]:
-        return {name: self.marks[name] for name in sorted(self.marks) if name.startswith(letter)}
-
-    def _cell(self, number: int, word: str, rows: int, cols: int) -> Cell:
-        if word in self.marks:
-            return self.marks[word]
+    def _cell(self, number: int, word: str) -> Cell:
+        grid = self.grid
+        if word in grid.marks:
+            return grid.marks[word]
         match = re.fullmatch(r"(\d+),(\d+)", word)
         if match is None:
             self.fail(
                 number, f"{word!r} is not a cell", "write row,column (such as 3,0) or a mark of the grid"
             )
         cell = Cell(int(match[1]), int(match[2]))
+        rows, cols = len(grid.rows), grid.cols
         if cell.row >= rows or cell.col >= cols:
             self.fail(
                 number,
                 f"cell {cell} is outside the grid of {rows} x {cols}",
                 f"rows run 0 to {rows - 1}, columns 0 to {cols - 1}",
             )
-        if cell in self.solid:
+        if cell in grid.solid:
             self.fail(number, f"cell {cell} is solid", "choose a free cell")
         return cell
 
@@ -230,22 +178,18 @@ class _Parser:
             self.fail(number, f"{key!r} takes one value, not {len(words)}", f"write '{key} VALUE'")
         return number, words[0]
 
-    def _cell_of(self, key: str, rows: int, cols: int) -> Cell:
-        number, word = self._single(key)
-        return self._cell(number, word, rows, cols)
-
     def _mark_of(self, key: str, letter: str) -> str:
         number, word = self._single(key)
-        if word not in self._marked(letter):
+        if word not in self.grid.marked(letter):
             self.fail(
                 number,
                 f"missing mark: {key} {word!r} is not in the grid",
-                f"mark its cell, or name one of {', '.join(self._marked(letter))}",
+                f"mark its cell, or name one of {', '.join(self.grid.marked(letter))}",
             )
         return word
 
-    def _chosen(self) -> frozenset[str]:
-        known = {*self.marks, *(obstacle.name for obstacle in self.obstacles), "start"}
+    def _chosen(self, obstacles: tuple[Obstacle, ...]) -> frozenset[str]:
+        known = {*self.grid.marks, *(obstacle.name for obstacle in obstacles), "start"}
         for name in self.values.get("chosen", []):
             if name not in known:
                 self.fail(
@@ -255,7 +199,7 @@ class _Parser:
                 )
         return frozenset(self.values.get("chosen", []))
 
-    def _obstacle(self, number: int, words: list[str], rows: int, cols: int) -> Obstacle:
+    def _obstacle(self, number: int, words: list[str]) -> Obstacle:
         if len(words) < _OBSTACLE_WORDS:
             self.fail(
                 number,
@@ -271,10 +215,10 @@ class _Parser:
         return Obstacle(
             name=name,
             kind=self._kind(number, kind),
-            cell=self._cell(number, cell, rows, cols),
+            cell=self._cell(number, cell),
             size=self._size(number, size),
             colour=self._colour(number, colour),
-            appears=self._appears(number, when, rows, cols),
+            appears=self._appears(number, when),
         )
 
     def _kind(self, number: int, word: str) -> Kind:
@@ -294,14 +238,14 @@ class _Parser:
             self.fail(number, f"{word!r} is not a colour", "write it as #rrggbb, such as #d9332b")
         return word.lower()
 
-    def _appears(self, number: int, words: list[str], rows: int, cols: int) -> Appears:
+    def _appears(self, number: int, words: list[str]) -> Appears:
         match words:
             case ["at", "start"]:
                 return Appears("start")
             case ["at", "step", step] if step.isdecimal():
                 return Appears("step", step=int(step))
             case ["when", "robot", cell]:
-                return Appears("robot", cell=self._cell(number, cell, rows, cols))
+                return Appears("robot", cell=self._cell(number, cell))
             case ["when", "doors", "open"]:
                 return Appears("doors")
         self.fail(
@@ -313,8 +257,5 @@ class _Parser:
 
 def _misspelt_key(words: list[str], section: str) -> bool:
     """Return whether a line among the grid's rows or the obstacles is rather a key with a slip in it."""
-    if section == "grid":
-        fits = words[0] in (".", "X", "|", ":") or _MARK.fullmatch(words[0]) is not None
-    else:
-        fits = len(words) >= _OBSTACLE_WORDS
+    fits = begins_row(words[0]) if section == "grid" else len(words) >= _OBSTACLE_WORDS
     return not fits and nearest(words[0], _KEYS) is not None

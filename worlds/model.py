@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import NDArray
 
-from worlds.layout import ACTIONS, Layout
-from worlds.maze import MazeState, step
+from worlds.layout import ACTIONS, Cell, Layout
+from worlds.maze import MazeState
 from worlds.variables import StateIndex, Variable
 
 
@@ -176,20 +174,38 @@ def maze_model(layout: Layout) -> TransitionModel:
     An episode may begin anywhere in the start's room except on its trigger, doors closed.
     """
     index = StateIndex(maze_variables(layout))
-    successors = np.empty((index.size, len(ACTIONS)), dtype=np.int64)
-    starts = np.zeros(index.size, dtype=np.bool_)
-    room = layout.room(layout.start)
-    free = (cell for cell in layout.cells if cell not in layout.solid)
-    places = product(free, layout.triggers.values(), layout.goals.values())
-    cells = {cell: layout.number(cell) for cell in layout.cells}
-    for (robot, trigger, goal), doors_open in product(places, (False, True)):
-        state = MazeState(cells[robot], cells[trigger], cells[goal], doors_open)
-        number = state_number(layout, index, state)
-        starts[number] = not doors_open and robot in room and robot != trigger
-        for action in range(len(ACTIONS)):
-            after, _ = step(layout, state, action)
-            successors[number, action] = state_number(layout, index, after)
-    return TransitionModel(index, ACTIONS, successors, np.full(successors.shape, -1.0), starts)
+    free, triggers = _numbers(layout, index, "robot"), _numbers(layout, index, "trigger")
+    place = np.full(len(layout.cells) + 1, -1)  # the last is read for -1: no passage
+    place[free] = np.arange(free.size)
+    shape = (*index.shape, len(ACTIONS))
+    after = np.empty(shape, dtype=np.int64)
+    goals = np.arange(shape[2])[:, None]
+    for doors_open in (False, True):
+        robot = place[_passages(layout, free, doors_open=doors_open)]  # (free cells, actions)
+        robot = np.where(robot < 0, np.arange(free.size)[:, None], robot)[:, None, None, :]
+        moved = robot != np.arange(free.size)[:, None, None, None]
+        opens = doors_open | (moved & (free[robot] == triggers[:, None, None]))
+        place_of = (robot, np.arange(triggers.size)[:, None, None], goals, opens.astype(np.int64))
+        after[..., int(doors_open), :] = np.ravel_multi_index(np.broadcast_arrays(*place_of), index.shape)
+    room = np.zeros(len(layout.cells), dtype=np.bool_)
+    room[[layout.number(cell) for cell in layout.room(layout.start)]] = True
+    starts = np.zeros(index.shape, dtype=np.bool_)
+    starts[..., 0] = (room[free][:, None] & (free[:, None] != triggers))[..., None]
+    successors = after.reshape(index.size, len(ACTIONS))
+    return TransitionModel(index, ACTIONS, successors, np.full(successors.shape, -1.0), starts.reshape(-1))
+
+
+def _numbers(layout: Layout, index: StateIndex, name: str) -> NDArray[np.int64]:
+    """Return the cell numbers that a variable of a maze takes, in the order of its domain."""
+    cells = index.variable(name).values
+    return np.array([layout.number(cell) for cell in cells if isinstance(cell, Cell)], dtype=np.int64)
+
+
+def _passages(layout: Layout, cells: NDArray[np.int64], *, doors_open: bool) -> NDArray[np.int64]:
+    """Return `Layout.passage` of cells under every action, shape (cells, actions)."""
+    neighbours = np.array(layout.neighbours, dtype=np.int64)[cells]
+    shut = np.array(layout.gates, dtype=np.bool_)[cells] & (not doors_open)
+    return np.where(shut, -1, neighbours)
 
 
 def state_number(layout: Layout, index: StateIndex, state: MazeState) -> int:

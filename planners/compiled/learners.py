@@ -19,7 +19,7 @@ from planners.compiled.shapes import find_shapes
 from planners.compiled.source import NO_SCHEDULE, STUCK, Kind, Writer
 from planners.compiled.tables import lay_out
 from planners.exploration import Boltzmann, Exploration, Explorer
-from planners.flat import FlatQ
+from planners.flat import FlatQ, flattened
 from planners.learner import EpisodeTooLongError, Learner, Settings, streams_of
 from planners.maxq import MaxQ
 from planners.maxq_q import MaxQQ
@@ -88,7 +88,7 @@ class Compiled(ABC, Generic[L]):
         self.seeds = [tuple(seed) for seed in seeds]
         self.threads = threads or len(os.sched_getaffinity(0))
         self._given = grounded
-        self.grounded = self._reference(0).grounded
+        self.grounded = self._ground(grounded)
         nodes = self.grounded.nodes
         explorers = by_task(self.grounded, self.settings.exploration, self.settings.explorations)
         rates = by_task(self.grounded, self.settings.rate, self.settings.rates)
@@ -121,6 +121,11 @@ class Compiled(ABC, Generic[L]):
         streams = [streams_of(seed) for seed in self.seeds]
         self._learning = _Streams.of([random for random, _ in streams])
         self._following = _Streams.of([chance for _, chance in streams])
+
+    @staticmethod
+    def _ground(grounded: GroundGraph) -> GroundGraph:
+        """Return what the reference learns on."""
+        return grounded
 
     @abstractmethod
     def _fill(self, learner: L, values: NDArray[np.float64]) -> None:
@@ -343,6 +348,10 @@ class CompiledFlatQ(Compiled[FlatQ]):
 
     reference = FlatQ
     kind = "flat-q"
+
+    @staticmethod
+    def _ground(grounded: GroundGraph) -> GroundGraph:
+        return flattened(grounded)
 
     def _fill(self, learner: FlatQ, values: NDArray[np.float64]) -> None:
         for task, k, rows in _places(learner.table):

@@ -89,6 +89,20 @@ def test_every_affordance_under_replanning_is_optimal(results: dict[str, Any]) -
     assert set(dynamic["outcomes"]) == {"reached", "truncated", "no route left", "wrong shape believed"}
 
 
+def test_snapshots_are_held_to_the_exact_planner(results: dict[str, Any]) -> None:
+    """The same affordances by each reading of the spheres; as blocks they hide ways, and never trap."""
+    snapshots = results["snapshots"]
+    assert list(snapshots) == ["as they stand", "as floor", "as blocks"]
+    ends = ("optimal", "longer than needed", "leaves no way", "sees no way")
+    for tally in snapshots.values():
+        assert sum(tally[end] for end in ends) == tally["affordances"]
+        assert (tally["smallest"] is None) == (tally["optimal"] == tally["affordances"])
+    assert 0 < snapshots["as floor"]["affordances"] <= results["dynamic"]["affordances"]
+    blocks, standing = snapshots["as blocks"], snapshots["as they stand"]
+    assert (blocks["leaves no way"], standing["sees no way"]) == (0, 0)
+    assert blocks["optimal"] < standing["optimal"]
+
+
 def test_perception_is_measured_on_the_camera(results: dict[str, Any]) -> None:
     """The Hough backend is right on most fresh frames; its confusion matrix adds up."""
     seen = results["perception"]
