@@ -14,13 +14,13 @@ import statistics
 import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import gymnasium
 import minigrid  # noqa: F401 - registers its environments
 import numpy as np
 import torch
+from side_by_side import machine
 from torchrl.envs import EnvBase, GymEnv
 
 from worlds import registration  # noqa: F401 - registers ours
@@ -41,14 +41,6 @@ class Line(NamedTuple):
     peer: str
     ratio: float | None = None
     rate: float | None = None
-
-
-def machine() -> str:
-    """Return the name of the processor."""
-    for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-        if line.startswith("model name"):
-            return line.partition(":")[2].strip()
-    return "unknown processor"
 
 
 def single(name: str, actions: int, steps: int, **arguments: Any) -> Run:

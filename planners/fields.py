@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from worlds import TransitionModel
 
 UNREACHED = -1
 """The distance of a state from which the goal cannot be reached."""
+_LARGE: Final = 2**16  # entries of a table of successors from which on a kernel pays, its loading included
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class Field:
 def distance_field(
     successors: NDArray[np.int64], goal: NDArray[np.bool_], allowed: NDArray[np.bool_]
 ) -> Field:
-    """Breadth-first search backwards from the goal states.
+    """Breadth-first search backwards from the goal states; in machine code where there are many.
 
     Parameters
     ----------
@@ -66,6 +68,18 @@ def distance_field(
     >>> field.distance, field.optimal()[0]
     (array([2, 1, 0]), array([False,  True]))
     """
+    if successors.size < _LARGE:
+        return plain_distance_field(successors, goal, allowed)
+    from planners.field_kernels import search  # noqa: PLC0415 - loads numba, which small fields do without
+
+    table, may = np.ascontiguousarray(successors, np.int64), np.ascontiguousarray(allowed, np.bool_)
+    return Field(goal, allowed, successors, search(table, np.ascontiguousarray(goal, np.bool_), may))
+
+
+def plain_distance_field(
+    successors: NDArray[np.int64], goal: NDArray[np.bool_], allowed: NDArray[np.bool_]
+) -> Field:
+    """Return what `distance_field` returns, by a search that can be read."""
     states, actions = successors.shape
     source = np.repeat(np.arange(states), actions)[allowed.ravel()]
     order = np.argsort(successors.ravel()[allowed.ravel()], kind="stable")

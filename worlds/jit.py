@@ -166,7 +166,10 @@ def without_lowest(x: Any) -> Any:
 
 @intrinsic  # type: ignore[untyped-decorator]
 def pointer(context: Any, array: Any) -> Any:  # noqa: ARG001 - numba's form
-    """Return a pointer to an array's values: passed on, it costs neither a count nor a test of its index."""
+    """Return a pointer to an array's values: passed on, it costs neither a count nor a test of its index.
+
+    It does not keep the array alive. Take it of arguments alone, which the caller holds.
+    """
 
     def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return context.make_array(signature.args[0])(context, builder, arguments[0]).data

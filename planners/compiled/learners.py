@@ -33,6 +33,7 @@ _SHARED: Final = 1000
 
 L = TypeVar("L", bound=Learner)
 Steps = NDArray[np.int32]
+_Work = Callable[[int, int, NDArray[np.int64], NDArray[np.float64]], int]
 
 
 class Compiled(ABC, Generic[L]):
@@ -202,10 +203,10 @@ class Compiled(ABC, Generic[L]):
         begin = np.asarray(states, dtype=np.int64)
         told = np.array(self._told[task], dtype=np.int64)
 
-        def follow(low: int, high: int, trouble: NDArray[np.int64]) -> int:
+        def follow(low: int, high: int, trouble: NDArray[np.int64], scratch: NDArray[np.float64]) -> int:
             status: int = self._kernel.follow(
                 told, low, high, *self._following.arrays, self.values, begin, limit, steps,
-                *self._world, trouble, self._room,
+                *self._world, trouble, scratch,
             )  # fmt: skip
             return status
 
@@ -233,11 +234,11 @@ class Compiled(ABC, Generic[L]):
         while True:
             at, schedule = tabulate(self._schedules, self._scheduled)
 
-            def learn(low: int, high: int, trouble: NDArray[np.int64]) -> int:
+            def learn(low: int, high: int, trouble: NDArray[np.int64], scratch: NDArray[np.float64]) -> int:
                 status: int = self._kernel.learn(
                     told, low, high, *self._learning.arrays, self.values, self.episodes,
                     at, schedule, self._scheduled, starts, steps.shape[1], self.settings.max_steps, steps,  # noqa: B023
-                    *self._world, trouble, self._room,
+                    *self._world, trouble, scratch,
                 )  # fmt: skip
                 return status
 
@@ -250,15 +251,16 @@ class Compiled(ABC, Generic[L]):
                 self._heed(ends)
             self._scheduled *= 2
 
-    def _share(self, work: Callable[[int, int, NDArray[np.int64]], int], episodes: int) -> list[_End]:
+    def _share(self, work: _Work, episodes: int) -> list[_End]:
         """Do the work of all runs, `threads` at a time."""
         runs = len(self.seeds)
         parts = min(runs, 4 * self.threads) if self.threads > 1 and episodes >= _SHARED else 1
         bounds = [runs * part // parts for part in range(parts + 1)]
 
         def one(part: int) -> _End:
-            trouble = np.zeros(4, dtype=np.int64)
-            return _End(work(bounds[part], bounds[part + 1], trouble), *trouble.tolist())
+            # Kernels read these through pointers: they must live here, where nobody frees them meanwhile.
+            trouble, scratch = np.zeros(4, dtype=np.int64), np.empty(self._room)
+            return _End(work(bounds[part], bounds[part + 1], trouble, scratch), *trouble.tolist())
 
         if parts == 1:
             return [one(0)]

@@ -519,19 +519,17 @@ _WORLD: Final = "uint64[::1], int32[::1], int64[:, ::1], int32[::1], int32[::1],
 _POINTERS: Final = """\
     words, rows, links = pointer(words_), pointer(rows_), pointer(links_)
     first, after = pointer(first_), pointer(after_)
-    reward, up_to, trouble = pointer(reward_), pointer(up_to_), pointer(trouble_)
-    scratch_ = np.empty(room)
-    scratch = pointer(scratch_)
+    reward, up_to, trouble, scratch = pointer(reward_), pointer(up_to_), pointer(trouble_), pointer(scratch_)
 """
 _LEARN: Final = (
     f"""
 @kernel(
     "int64(int64[::1], int64, int64, uint64[::1], int64[::1], float64[:, ::1], int64[:, ::1], int64[::1], "
-    "float64[::1], int64, int64[::1], int64, int64, int32[:, ::1], {_WORLD}, int64[::1], int64)"
+    "float64[::1], int64, int64[::1], int64, int64, int32[:, ::1], {_WORLD}, int64[::1], float64[::1])"
 )
 def learn(
     me, low, high, keys, counters, values_, counts_, at_, schedule_, length, starts, episodes, limit, steps,
-    words_, rows_, links_, first_, after_, reward_, up_to_, trouble_, room,
+    words_, rows_, links_, first_, after_, reward_, up_to_, trouble_, scratch_,
 ):
 {_POINTERS}    at, schedule = pointer(at_), pointer(schedule_)
     for run in range(low, high):
@@ -557,11 +555,11 @@ _FOLLOW: Final = (
     f"""
 @kernel(
     "int64(int64[::1], int64, int64, uint64[::1], int64[::1], float64[:, ::1], int64[::1], int64, "
-    "int64[:, ::1], {_WORLD}, int64[::1], int64)"
+    "int64[:, ::1], {_WORLD}, int64[::1], float64[::1])"
 )
 def follow(
     me, low, high, keys, counters, values_, starts, limit, steps,
-    words_, rows_, links_, first_, after_, reward_, up_to_, trouble_, room,
+    words_, rows_, links_, first_, after_, reward_, up_to_, trouble_, scratch_,
 ):
 {_POINTERS}    for run in range(low, high):
         key, c = keys[run], counters[run]
