@@ -167,11 +167,9 @@ class Compiled(ABC, Generic[L]):
         UserError
             If the task comes to a state in which it has no child to call, or there is nothing to start from.
         """
-        if not len(starts):
-            raise UserError(f"task {self.grounded.nodes[task].name} has no states to start from; give starts")
+        begin = self._checked(task, starts)
         self.episodes[:, task] = 0
         steps = np.zeros((len(self.seeds), episodes), dtype=np.int32)
-        begin = np.asarray(starts, dtype=np.int64)
         if after_each is None:
             self._learn(task, begin, steps)
             return steps
@@ -199,8 +197,8 @@ class Compiled(ABC, Generic[L]):
         ndarray
             Steps from each state, shape (runs, states); -1 past `limit`.
         """
-        steps = np.zeros((len(self.seeds), len(states)), dtype=np.int64)
-        begin = np.asarray(states, dtype=np.int64)
+        begin = self._checked(task, states)
+        steps = np.zeros((len(self.seeds), begin.size), dtype=np.int64)
         told = np.array(self._told[task], dtype=np.int64)
 
         def follow(low: int, high: int, trouble: NDArray[np.int64], scratch: NDArray[np.float64]) -> int:
@@ -226,6 +224,19 @@ class Compiled(ABC, Generic[L]):
     def _reference(self, number: int) -> L:
         learner = self.reference(self._given, self.seeds[number], self.settings)
         return cast(L, learner)
+
+    def _checked(self, task: int, states: Sequence[int]) -> NDArray[np.int64]:
+        """Return states as an array. A kernel does not look where it reads: it must be given good ones."""
+        nodes, size = self.grounded.nodes, self.grounded.model.index.size
+        if task not in self._told:
+            places = f"{len(self.grounded.model.actions)} to {len(nodes) - 1}"
+            raise UserError(f"{task} is not the place of a task; tasks have the places {places}")
+        begin = np.asarray(states, dtype=np.int64)
+        if begin.ndim != 1 or not begin.size:
+            raise UserError(f"task {nodes[task].name} has no states to start from; give a list of them")
+        if begin.min() < 0 or begin.max() >= size:
+            raise UserError(f"task {nodes[task].name}: states are numbers from 0 to {size - 1}, not {states}")
+        return begin
 
     def _learn(self, task: int, starts: NDArray[np.int64], steps: Steps) -> None:
         """Run the episodes that `steps` has room for; on an error leave everything as it was."""

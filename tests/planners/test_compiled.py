@@ -247,12 +247,18 @@ def test_what_is_not_compiled_is_refused(given: Settings, message: str) -> None:
 
 
 def test_no_seeds_and_no_starts_are_refused() -> None:
-    """Nothing to run, and nothing to start from, are errors of the user."""
+    """Nothing to run, nothing to start from, and what is no task or state are errors of the user."""
     with pytest.raises(UserError, match="needs a seed for each run"):
         CompiledMaxQ(maze_graph(), [])
     grounded = maze_graph()
-    with pytest.raises(UserError, match="task Root has no states to start from"):
-        CompiledMaxQ(grounded, [(1,)]).train(grounded.root, [], 5)
+    learner = CompiledMaxQ(grounded, [(1,)])
+    for call in (lambda task, states: learner.train(task, states, 5), learner.greedy_steps):
+        with pytest.raises(UserError, match="task Root has no states to start from"):
+            call(grounded.root, [])
+        with pytest.raises(UserError, match="states are numbers from 0 to 2047, not"):
+            call(grounded.root, [5, 2048])
+        with pytest.raises(UserError, match="2 is not the place of a task; tasks have the places 4 to 14"):
+            call(2, [5])
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
