@@ -203,8 +203,11 @@ class _Builder:
         for label, text in form.values:
             if text in domain.labels:
                 found.append((label, domain.values[domain.labels.index(text)]))
+            elif text in self.world.marks and self.world.marks[text] in domain:
+                found.append((label, self.world.marks[text]))
             else:
-                mend = suggest(text, domain.labels, "its values:")
+                marks = [mark for mark, value in self.world.marks.items() if value in domain]
+                mend = suggest(text, (*marks, *domain.labels), "its values:")
                 self.fail((*path, "values", label), f"unknown value {text!r} of {form.of}", mend)
         return found
 

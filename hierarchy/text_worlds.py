@@ -9,8 +9,8 @@ without arguments that returns a `TextWorld`. In its pyproject.toml::
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -62,6 +62,8 @@ class TextWorld:
         Makes its transition model, which only `affordant check` needs.
     sets
         Sets of values that a predicate may name, such as the rooms of a maze.
+    marks
+        Values by names of their own besides their labels, such as the grids behind a maze's doors.
     """
 
     name: str
@@ -69,6 +71,7 @@ class TextWorld:
     actions: tuple[str, ...]
     model: Callable[[], TransitionModel]
     sets: tuple[ValueSet, ...] = ()
+    marks: Mapping[str, Hashable] = field(default_factory=dict)
 
 
 def maze_world(layout: Layout, name: str | None = None) -> TextWorld:
@@ -96,6 +99,7 @@ def maze_world(layout: Layout, name: str | None = None) -> TextWorld:
         actions=ACTIONS,
         model=lambda: maze_model(layout),
         sets=(*rooms, doors) if doors.values else rooms,
+        marks=layout.thresholds,
     )
 
 

@@ -132,6 +132,9 @@ class _Writer:
         for variable in holders:
             if tuple(map(variable.label, domain.values)) == domain.labels:
                 return _values(variable.name, _sequence(domain.labels))
+        marks = self.world.marks
+        if holders and [marks.get(label) for label in domain.labels] == list(domain.values):
+            return _values(holders[0].name, _sequence(domain.labels))
         if holders:
             return _values(holders[0].name, _labelled(domain, map(holders[0].label, domain.values)))
         if tuple(map(str, domain.values)) == domain.labels:

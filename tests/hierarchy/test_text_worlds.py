@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from hierarchy import check, table_sizes, text_worlds
+from hierarchy import check, table_sizes, text_worlds, two_rooms
 from hierarchy.check import checked
 from hierarchy.hdg import hdg_graph
 from hierarchy.taxi import taxi_graph
-from hierarchy.text import TextWorld, load_graph, load_world, parse_graph, world_names
+from hierarchy.text import TextWorld, graph_text, load_graph, load_world, parse_graph, world_names
 from worlds import TransitionModel, UserError, Variable
+from worlds.generate import generate_layout
 from worlds.hdg import LandmarkMaze
+from worlds.layout_writing import layout_text
 from worlds.taxi import taxi_model
 
 MAZE = "name small\ngrid\n.  T1 | .\n.  .  : D1\nG1 .  | .\nstart 0,0\ntrigger T1\ngoal G1\n"
@@ -170,3 +172,20 @@ def test_a_world_that_cannot_be_loaded_says_why() -> None:
         UserError, match=r"world 'broken' \(nowhere_at_all:world\) cannot be loaded: No module"
     ):
         load_world("broken")
+
+
+def test_the_paper_s_graph_fits_other_mazes(tmp_path: Path) -> None:
+    """Its doors are those of the world that it is read for, so that it is sound on a maze of any size."""
+    maze = generate_layout(6, 10, seed=2)
+    (tmp_path / "drawn.maze").write_text(layout_text(maze))
+    graph, world = load_graph("two_rooms", load_world(str(tmp_path / "drawn.maze")))
+    assert graph.tasks == two_rooms(maze).tasks
+    assert check(graph, world.model()) == ()
+    assert "values: [D1, D2]" in graph_text(graph, world)
+
+
+def test_a_door_that_is_not_there_is_told() -> None:
+    """A mark that the world lacks is an unknown value, with those that there are."""
+    text = graph_text(*load_graph("two_rooms")).replace("[D1, D2]", "[D1, D3]")
+    with pytest.raises(UserError, match=r"unknown value 'D3' of robot; its values: D1, D2, 0,0"):
+        parse_graph(text)
