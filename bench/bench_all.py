@@ -7,7 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-ALL = ("learners", "worlds", "oracle", "scaling", "abstraction")
+ALL = ("learners", "worlds", "oracle", "scaling", "abstraction", "perception")
 
 
 def main() -> None:

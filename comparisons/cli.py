@@ -57,6 +57,100 @@ def reproduce(
 
 
 @app.command
+def perceive(path: Path, /, *, perception: str = "hough", out: Path | None = None) -> int:
+    """Tell what stands ahead in your own pictures: none, cube or sphere, how far, and how surely.
+
+    Exit status 0 says that every file could be read, 1 that some could not (a line each on standard error),
+    2 that nothing was looked at.
+
+    Parameters
+    ----------
+    path
+        A picture (PNG, JPEG, BMP or WebP), or a folder of them. The middle square of each is looked at.
+    perception
+        Backend: hough, cnn, hog, ensemble, one that an installed package adds, or, for weights of your own,
+        NAME=FILE such as cnn=mine/cnn.safetensors.
+    out
+        Directory to make, for percepts.csv and annotated pictures; it must not exist.
+    """
+    from comparisons.perceive_commands import perceive as run
+
+    found = run(
+        path,
+        perception,
+        out,
+        lambda one: print(one, file=sys.stdout if one.detection else sys.stderr, flush=True),
+    )
+    return 1 if any(one.detection is None for one in found) else 0
+
+
+@app.command
+def train_perception(*, backend: str = "cnn", out: Path, frames: int = 5000, seed: int = 0) -> int:
+    """Train a backend on frames that are rendered, and labelled by pushing what they show.
+
+    Parameters
+    ----------
+    backend
+        Backend that learns: cnn, hog, ensemble, or one that an installed package adds.
+    out
+        Folder for the weights and the frames. After a break, the same command goes on with the frames.
+    frames
+        Number of frames to learn from.
+    seed
+        Of frames and training, 0 to 99.
+    """
+    from comparisons.learnt import train_perception as run
+
+    weights = run(backend, out, frames, seed, Console(stderr=True))
+    print(weights)
+    print(weights.with_suffix(".json"))
+    return 0
+
+
+@app.command
+def compare_perception(
+    *,
+    out: Path,
+    backends: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable=())] = (),
+    frames: int | None = None,
+    episodes: int | None = None,
+    seed: int = 200,
+    quick: bool = False,
+) -> int:
+    """Compare perception backends: accuracy, calibration, latency, and what mistakes cost in the task.
+
+    Parameters
+    ----------
+    out
+        Directory to make; it must not exist.
+    backends
+        Names, or NAME=FILE for weights of your own. Defaults to every backend that reads frames.
+    frames
+        Frames of every set. Defaults to 1000, or 90 if quick.
+    episodes
+        Random episodes of the task. Defaults to 200, or 20 if quick.
+    seed
+        Of the frames, 200 to 299; the seeds below train and tune.
+    quick
+        Fewer frames, episodes and severities, for a first look.
+    """
+    from comparisons.perception_compare import compare_perception as run
+    from comparisons.perception_compare import summarise_perception
+    from comparisons.perception_study import StudySpec
+
+    spec = StudySpec(
+        backends,
+        seed,
+        (90 if quick else 1000) if frames is None else frames,
+        (20 if quick else 200) if episodes is None else episodes,
+        (1, 3, 5) if quick else (1, 2, 3, 4, 5),
+    )
+    print(summarise_perception(run(spec, out, Console(stderr=True))))
+    print(f"report: {out / 'report.html'}")
+    return 0
+
+
+@app.command
 def doctor() -> int:
     """Check versions, import names and heavy libraries, and say how to mend each fault."""
     from comparisons.doctor import examine

@@ -12,11 +12,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from comparisons.conformance_backend import check_backend
 from comparisons.conformance_env import check_box
 from comparisons.conformance_parts import ConformanceError, hold, sample, state_words
 from hierarchy import Constant, GroundGraph, Predicate, TaskGraph, checked, prove_abstraction, two_rooms
 from hierarchy.check import examine
-from perception.protocol import LABELS, Backend, Detection, View
 from planners import task_field
 from worlds import Layout, TransitionModel, maze_model, parse_layout
 from worlds.black_box import BlackBox
@@ -242,33 +242,6 @@ def _only_looks(asked: Learner, unasked: Learner, place: int, states: Sequence[i
             asked.value(place, state) == unasked.value(place, state),
             "asking for greedy steps changes what is learnt; let them neither learn nor draw from its stream",
         )
-
-
-def check_backend(backend: Backend, views: Sequence[View]) -> None:
-    """Check a perception backend on some views of the kind that it is made for.
-
-    It gives one sound detection a view, in order; the same view the same detection, alone or in a batch;
-    and it does not change the frames.
-
-    Raises
-    ------
-    ConformanceError
-        If not; the message names the view.
-
-    Examples
-    --------
-    >>> from perception import NOTHING, Truth
-    >>> check_backend(Truth(), [View(None, NOTHING), View(None, Detection("cube", 1.0, 2))])
-    """
-    frames = [None if view.frame is None else view.frame.copy() for view in views]
-    batch = backend.detect(views)
-    hold(len(batch) == len(views), f"{len(views)} views got {len(batch)} detections")
-    for i, (view, frame, found) in enumerate(zip(views, frames, batch, strict=True)):
-        hold(isinstance(found, Detection) and found.label in LABELS, f"view {i} got {found!r}, no detection")
-        hold(backend.detect([view]) == [found], f"view {i} got another detection alone than in the batch")
-        if frame is not None and view.frame is not None:
-            hold(bool((frame == view.frame).all()), f"the frame of view {i} was changed")
-    hold(backend.detect([]) == [], "no views must give no detections")
 
 
 def conformance_maze() -> Layout:

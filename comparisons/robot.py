@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Protocol
 
 from comparisons.belief import Belief
@@ -113,6 +114,11 @@ class Run:
         """Primitive steps taken."""
         return len(self.cells) - 1
 
+    @property
+    def blocked(self) -> int:
+        """Steps that left the robot where it was: each is a mistake that it felt."""
+        return sum(here == there for here, there in pairwise(self.cells))
+
 
 class Robot:
     """Carries episodes through with one strategy and one eye.
@@ -168,7 +174,13 @@ class Robot:
         looked: dict[int, Detection] = {}
         met: list[Encounter] = []
         insisted: int | None = None
-        while task is not None:
+        while True:
+            if task is None:
+                # Before it gives up, it tries by touch what it is least sure of.
+                if not belief.doubt():
+                    return None
+                task, insisted = self.strategy.choose(belief.state), None
+                continue
             route = self.strategy.route(task, belief.state)
             if route is None:
                 other = self.strategy.choose(belief.state)
@@ -177,6 +189,12 @@ class Robot:
                 continue
             action = route[0] if insisted is None else insisted
             if action in looked:
+                if belief.fails(action):
+                    # It would fail again. With that learnt there may be another way.
+                    if not belief.rule_out(action) and insisted is None:
+                        return None
+                    insisted = None
+                    continue
                 return Moment(episode.steps, task, action, looked[action], tuple(met))
             looked[action] = self._look(episode, action, run)
             cell = belief.see(action, looked[action])
@@ -184,7 +202,6 @@ class Robot:
             if encounter is not None:
                 met.append(encounter)
                 insisted = encounter.affordance.action
-        return None
 
     def _look(self, episode: Episode, action: int, run: Run) -> Detection:
         detection = self.eye.look(episode, action)

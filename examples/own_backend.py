@@ -1,37 +1,38 @@
-"""A perception backend of your own beside ours: the same frames, the same score."""
-
-from collections.abc import Sequence
+"""A perception backend of your own beside ours: checked by the conformance kit, then the same frames."""
 
 import cv2
+import numpy as np
 
+from comparisons.conformance import check_backend
 from perception.accuracy import measure
 from perception.frames import fresh_views
-from perception.protocol import Detection, View
+from perception.percepts import Percepts, Sees, checked_frames
+from perception.protocol import Frames
 from perception.registry import load_backend
 from worlds import load_layout
 from worlds.camera import Camera
 
 
-class Colourful:
-    """Calls a frame's middle a sphere, one cell ahead, where it is neither blue, white nor brown."""
+class Colourful(Sees):
+    """Takes a frame's middle for a sphere, one cell ahead, where it is neither blue, white nor brown."""
 
     name = "colourful"
-    needs_frames = True
 
-    def detect(self, views: Sequence[View]) -> list[Detection]:
-        """Return one detection a view."""
-        return [self._detect(view) for view in views]
+    def perceive(self, frames: Frames) -> Percepts:
+        """Return what stands ahead in each frame."""
+        odd = np.array([self._odd(frame) for frame in checked_frames(frames)])
+        sphere = np.clip(0.4 + odd, 0, 1)  # a tenth of the middle is as likely a sphere as none
+        chances = np.column_stack([1 - sphere, np.zeros(len(odd)), sphere])
+        return Percepts(chances, np.ones(len(odd), np.int64), np.zeros(len(odd), np.bool_))
 
-    def _detect(self, view: View) -> Detection:
-        assert view.frame is not None, "it asked for frames"
-        pixels = view.frame.shape[0]
-        middle = view.frame[pixels // 3 : 2 * pixels // 3, pixels // 3 : 2 * pixels // 3]
-        hue = cv2.cvtColor(middle, cv2.COLOR_RGB2HSV)
-        odd = ((hue[..., 1] > 90) & ((hue[..., 0] < 100) | (hue[..., 0] > 125))).mean()
-        return Detection("sphere", float(odd), 1) if odd > 0.1 else Detection("none", 1 - float(odd), 0)
+    def _odd(self, frame: Frames) -> float:
+        third = len(frame) // 3
+        hue = cv2.cvtColor(frame[third : 2 * third, third : 2 * third], cv2.COLOR_RGB2HSV)
+        return float(((hue[..., 1] > 90) & ((hue[..., 0] < 100) | (hue[..., 0] > 125))).mean())
 
 
 maze, camera = load_layout("two_rooms"), Camera()
+check_backend(Colourful(), list(fresh_views(maze, 9, seed=2, camera=camera)))
 for backend in (Colourful(), load_backend("hough", camera)):
     result = measure(backend, fresh_views(maze, 90, seed=3, camera=camera))
     print(f"{backend.name}: {100 * result.accuracy:.0f} % of {result.frames} frames")

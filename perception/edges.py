@@ -69,7 +69,6 @@ class OutlineReader:
         col, row = np.moveaxis(place.clip(0, pixels - 1), -1, 0)
         self._flat = row * pixels + col
         self._across, self._down = np.moveaxis(outlines.normals, -1, 0).astype(np.float32)
-        self._weights = outlines.weights
 
     def evidence(self, found: Gradients, *, steep: float, alignment: float) -> NDArray[np.float64]:
         """Return the share of each outline that edges of its direction bear out, shape (outlines,).
@@ -87,5 +86,5 @@ class OutlineReader:
         through = np.abs(across * self._across + down * self._down)
         aligned = self._inside & (through >= alignment * np.sqrt(across * across + down * down))
         borne_out = (np.minimum(through / steep, 1.0) * aligned).max(axis=0)
-        share: NDArray[np.float64] = borne_out @ self._weights
-        return share.clip(0.0, 1.0)  # the weights sum to 1 only up to rounding
+        share: NDArray[np.float64] = borne_out.mean(axis=1, dtype=np.float64)
+        return share

@@ -75,7 +75,7 @@ def fresh_scene(layout: Layout, seed: int, number: int) -> FreshScene:
     >>> sorted(fresh_scene(maze, seed=1, number=i).truth.label for i in range(3))
     ['cube', 'none', 'sphere']
     """
-    return _draw(layout, _ways(layout), seed, number)
+    return _draw(layout, ways_ahead(layout), seed, number)
 
 
 def fresh_views(layout: Layout, n: int, seed: int, camera: Camera | None = None) -> Iterator[View]:
@@ -104,7 +104,7 @@ def fresh_views(layout: Layout, n: int, seed: int, camera: Camera | None = None)
     ...     view.frame.shape
     (64, 64, 3)
     """
-    ways = _ways(layout)
+    ways = ways_ahead(layout)
     with Twin(layout, camera) as twin:
         for number in range(n):
             scene = _draw(layout, ways, seed, number)
@@ -140,7 +140,7 @@ def _obstacle(stream: Stream, name: str, cell: Cell, kind: Label) -> Obstacle:
     return Obstacle(name, kind, cell, stream.choose(SIZES), f"#{stream.below(1 << 24):06x}")
 
 
-def _ways(layout: Layout) -> Ways:
+def ways_ahead(layout: Layout) -> Ways:
     """Return the way ahead of every free cell along every action, doors shut and doors open."""
     return {
         doors_open: tuple(

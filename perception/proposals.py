@@ -160,3 +160,21 @@ def cover(lines: NDArray[np.float64], sides: NDArray[np.float64]) -> NDArray[np.
     top, bottom = np.minimum(lines[:, 1], lines[:, 3]), np.maximum(lines[:, 1], lines[:, 3])
     shared = (np.minimum(bottom, y0) - np.maximum(top, y1)).clip(0) / (y0 - y1)
     return np.where(beside < _NEAR, shared, 0.0)
+
+
+def agree(found: NDArray[np.float64], expected: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Return which circles found could be which expected, shape (found, expected).
+
+    Parameters
+    ----------
+    found, expected
+        Column and row of the centre, and radius, in pixels, shape (circles, 3).
+
+    Examples
+    --------
+    >>> agree(np.array([[50.0, 50.0, 10.0]]), np.array([[51.0, 52.0, 9.0], [60.0, 50.0, 10.0]])).tolist()
+    [[True, False]]
+    """
+    off = np.abs(found[:, None] - expected).max(axis=2)
+    near: NDArray[np.bool_] = off < 1.5 + 0.1 * expected[:, 2]  # pixels, and the more the larger it is
+    return near

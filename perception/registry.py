@@ -27,6 +27,9 @@ Factory = Callable[[Camera], Backend]
 _OURS: Final = (
     EntryPoint("truth", "perception.registry:_truth", GROUP),
     EntryPoint("hough", "perception.hough:Hough", GROUP),
+    EntryPoint("cnn", "perception.cnn:Cnn", GROUP),
+    EntryPoint("hog", "perception.hog:Hog", GROUP),
+    EntryPoint("ensemble", "perception.ensemble:Ensemble", GROUP),
 )
 
 
@@ -35,8 +38,8 @@ def backend_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> backend_names()[:2]
-    ('truth', 'hough')
+    >>> backend_names()[:5]
+    ('truth', 'hough', 'cnn', 'hog', 'ensemble')
     """
     return tuple(_found())
 

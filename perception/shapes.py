@@ -1,8 +1,8 @@
 """What cubes and spheres look like from the robot: their outlines in the frame, by distance and radius.
 
 The robot stands at the centre of a cell and looks along an axis, and an obstacle rests on the floor at
-the centre of a cell ahead. So its outline depends on three things alone: cube or sphere, how many cells
-ahead, and its radius (half the edge for a cube).
+the centre of a cell ahead. So its outline depends on few things: cube or sphere, how many cells ahead,
+its radius (half the edge for a cube), and by how much a cube is turned about the upright.
 """
 
 from __future__ import annotations
@@ -18,18 +18,15 @@ from worlds.camera import Camera
 Points = NDArray[np.float64]
 """Points of the frame as (column, row) in pixels, shape (..., 2)."""
 
-LEFT_SIDE: Final = (0, 5)
-RIGHT_SIDE: Final = (1, 2)
+LEFT_SIDE: Final = (0, 6)
+RIGHT_SIDE: Final = (2, 3)
 """The corners (`cube_corners`) at the ends of a cube's sides, the lower one first."""
-_AROUND = 48  # points on a sphere's outline
-# Edges of a cube's outline: the corners at their ends, points on them, and their weight. The receding
-# edges of the top are short, so the two count as one.
-_EDGES = ((0, 5, 12, 1.0), (1, 2, 12, 1.0), (0, 1, 12, 1.0), (5, 4, 5, 0.5), (2, 3, 5, 0.5), (4, 3, 10, 1.0))
+_AROUND = 48  # points on an outline
 
 
 @dataclass(frozen=True, eq=False)
 class Outlines:
-    """The outlines of one kind of obstacle, one for each distance and radius.
+    """The outlines of one kind of obstacle, one for each distance, radius and yaw.
 
     Parameters
     ----------
@@ -37,19 +34,15 @@ class Outlines:
         Cells ahead, and metres, shape (outlines,).
     points, normals
         Points along each outline and the unit normals there, shape (outlines, points, 2).
-    weights
-        Share of each point in the whole outline, shape (points,); they sum to 1.
     marks
         For spheres the circle, as column, row and radius in pixels, shape (outlines, 3). For cubes the
-        corners of the front face and the top: bottom left, bottom right, top right, back right, back
-        left, top left, shape (outlines, 6, 2).
+        corners of the outline (`cube_corners`), shape (outlines, 7, 2).
     """
 
     distances: NDArray[np.int64]
     radii: NDArray[np.float64]
     points: Points
     normals: Points
-    weights: NDArray[np.float64]
     marks: NDArray[np.float64]
 
     def __len__(self) -> int:
@@ -79,28 +72,52 @@ def sphere_outline(camera: Camera, distance: float, radius: float) -> Points:
     return np.array([camera.project(*point) for point in ring])
 
 
-def cube_corners(camera: Camera, distance: float, radius: float) -> Points:
-    """Return the corners of a cube that stands `distance` metres ahead, face on, shape (6, 2).
+def cube_corners(camera: Camera, distance: float, radius: float, yaw: float = 0.0) -> Points:
+    """Return the corners of the outline of a cube that stands `distance` metres ahead, shape (7, 2).
 
-    Bottom left, bottom right, top right, back right, back left, top left. Where the camera is too low to
-    see the cube's top, the back corners are the top ones.
+    Along the floor from left to right: left, foremost, right; then along the top from right to left:
+    right, back right, back left, left. Face on, nothing is foremost, and the middle of the lower edge
+    stands for it; seen over a corner, the two at the back are one. A camera too low to see the cube's top
+    sees the upper edges of its front instead.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    distance
+        From the robot to the cube's centre, in metres.
+    radius
+        Half the cube's edge, in metres.
+    yaw
+        By how many degrees the cube is turned about the upright.
 
     Examples
     --------
-    >>> cube_corners(Camera(pixels=128), 1, 0.25).round().tolist()[:3]
-    [[39.0, 110.0], [89.0, 110.0], [93.0, 68.0]]
+    >>> cube_corners(Camera(pixels=128), 1, 0.25).round().tolist()[:4]
+    [[39.0, 110.0], [64.0, 110.0], [89.0, 110.0], [93.0, 68.0]]
+    >>> cube_corners(Camera(pixels=128), 1, 0.25, 45).round().tolist()[:3]
+    [[33.0, 94.0], [64.0, 118.0], [95.0, 94.0]]
     """
-    front, top = distance - radius, 2 * radius
-    back = distance + radius if camera.height > top else front
-    corners = (
-        (front, -radius, 0.0),
-        (front, radius, 0.0),
-        (front, radius, top),
-        (back, radius, top),
-        (back, -radius, top),
-        (front, -radius, top),
-    )
-    return np.array([camera.project(*corner) for corner in corners])
+    turns = np.radians(yaw) + np.pi / 4 + np.arange(4) * np.pi / 2
+    base = radius * np.sqrt(2) * np.column_stack([np.cos(turns), np.sin(turns)])
+    base[:, 0] += distance  # ahead, and to the right
+    bearing = np.arctan2(base[:, 1], base[:, 0] - camera.forward)
+    order = np.argsort(bearing, kind="stable")
+    left = min(order[:2], key=lambda i: (bearing[i].round(9), base[i, 0]))
+    right = min(order[2:], key=lambda i: (-bearing[i].round(9), base[i, 0]))
+    middle = (base[left] + base[right]) / 2
+    others = [base[i] for i in range(4) if i not in (left, right)]
+    away = np.array([1.0, -1.0]) * (base[right] - base[left])[::-1]  # from the camera
+    near = [corner for corner in others if (corner - middle) @ away < 0]
+    far = sorted((corner for corner in others if (corner - middle) @ away >= 0), key=lambda c: -c[1])
+    front = near[0] if near else middle
+    if camera.height > 2 * radius:
+        back = [far[0], far[-1]]
+    else:
+        back = [front, front] if near else [base[right], base[left]]
+    floor = [(*corner, 0.0) for corner in (base[left], front, base[right])]
+    top = [(*corner, 2 * radius) for corner in (base[right], *back, base[left])]
+    return np.array([camera.project(*corner) for corner in floor + top])
 
 
 def sphere_outlines(camera: Camera, distances: NDArray[np.int64], radii: NDArray[np.float64]) -> Outlines:
@@ -114,26 +131,39 @@ def sphere_outlines(camera: Camera, distances: NDArray[np.int64], radii: NDArray
         *_columns(pairs),
         points=points,
         normals=_across(along),
-        weights=np.full(_AROUND, 1 / _AROUND),
         marks=np.column_stack([centres, circles]),
     )
 
 
-def cube_outlines(camera: Camera, distances: NDArray[np.int64], radii: NDArray[np.float64]) -> Outlines:
-    """Return the outlines of cubes for every distance (cells) and radius (half the edge, metres)."""
-    pairs = [(d, r) for d in distances.tolist() for r in radii.tolist()]
-    corners = np.array([cube_corners(camera, d, r) for d, r in pairs])
-    points, along, weights = [], [], []
-    for one, other, count, weight in _EDGES:
-        start, edge = corners[:, one, None], (corners[:, other] - corners[:, one])[:, None]
-        points.append(start + (np.arange(count)[:, None] + 0.5) / count * edge)
-        along.append(np.repeat(edge, count, axis=1))
-        weights.append(np.full(count, weight / count))
+def cube_outlines(
+    camera: Camera,
+    distances: NDArray[np.int64],
+    radii: NDArray[np.float64],
+    yaws: NDArray[np.float64] | tuple[float, ...] = (0.0,),
+) -> Outlines:
+    """Return the outlines of cubes for every distance (cells), radius (half the edge, metres) and yaw.
+
+    Examples
+    --------
+    >>> outlines = cube_outlines(Camera(), np.array([1, 2]), np.array([0.1, 0.2]), (0.0, 30.0, 60.0))
+    >>> outlines.points.shape, outlines.marks.shape
+    ((12, 48, 2), (12, 7, 2))
+    """
+    triples = [(d, r, yaw) for d in distances.tolist() for r in radii.tolist() for yaw in yaws]
+    corners = np.array([cube_corners(camera, *triple) for triple in triples])
+    edges = np.roll(corners, -1, axis=1) - corners
+    lengths = np.linalg.norm(edges, axis=2)
+    ends = lengths.cumsum(axis=1)
+    along = (np.arange(_AROUND) + 0.5) / _AROUND * ends[:, -1:]  # way along the outline, in pixels
+    edge = (along[:, :, None] >= ends[:, None]).sum(axis=2)
+    start = np.take_along_axis(ends - lengths, edge, axis=1)
+    share = (along - start) / np.take_along_axis(lengths, edge, axis=1)
+    tangents = np.take_along_axis(edges, edge[:, :, None], axis=1)
+    points = np.take_along_axis(corners, edge[:, :, None], axis=1) + share[:, :, None] * tangents
     return Outlines(
-        *_columns(pairs),
-        points=np.concatenate(points, axis=1),
-        normals=_across(np.concatenate(along, axis=1)),
-        weights=np.concatenate(weights) / sum(weight for *_, weight in _EDGES),
+        *_columns([(d, r) for d, r, _ in triples]),
+        points=points,
+        normals=_across(tangents),
         marks=corners,
     )
 

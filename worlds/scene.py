@@ -6,14 +6,16 @@ one for each obstacle. What rendering and physics cost goes by the number of bod
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from math import cos, radians, sin
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from worlds.bullet import connect, obstacle_shapes, rgba
-from worlds.camera import RADIUS, Matrix
+from worlds.bullet import Form, connect, height_of, obstacle_shapes, rgba
+from worlds.camera import Matrix
 from worlds.geometry import (
     WALL_HEIGHT,
     Corner,
@@ -27,7 +29,7 @@ from worlds.geometry import (
     thin,
     wall_boxes,
 )
-from worlds.layout import Cell, Edge, Kind, Layout, Obstacle, Size
+from worlds.layout import Cell, Edge, Layout, Obstacle, Size
 
 TIME_STEP: Final = 1 / 30
 """Seconds that one physics step covers."""
@@ -37,7 +39,7 @@ _ROBOT_Z = ROBOT_HEIGHT / 2 + 0.01  # clear of the floor
 _ROBOT_FORCE = 5000.0  # newtons with which the robot is dragged, at most
 _STIFFNESS = 0.8  # share of the robot's lag behind its grip that a physics step makes good
 _FRICTION = 5.0  # between sphere and floor: enough for a sphere that is pushed hard to roll at once
-_WALLS, _DOORS, _ROBOT, _NOSE = "#8c7a66", "#b5302a", "#3a3a44", "#20d0d0"
+_DOORS, _ROBOT, _NOSE = "#b5302a", "#3a3a44", "#20d0d0"
 _CORNERS = [[0, 0], [1, 0], [1, 1], [0, 1]]  # of the texture, for the corners of the floor
 _ROOT = 0.5**0.5
 _QUATERNIONS = {  # that turn +x to a heading
@@ -46,6 +48,46 @@ _QUATERNIONS = {  # that turn +x to a heading
     (-1.0, 0.0): (0.0, 0.0, 1.0, 0.0),
     (0.0, -1.0): (0.0, 0.0, -_ROOT, _ROOT),
 }
+
+
+@dataclass(frozen=True)
+class Look:
+    """How a maze is painted and lit; by default as in the paper.
+
+    Parameters
+    ----------
+    floor
+        The two colours of the floor's cells, ``#rrggbb``; the first is that of cell (0, 0).
+    walls
+        The colour of the walls.
+    ambient, diffuse
+        Share of the light that falls on every side alike, and on the sides that face the lamp.
+    tint
+        Red, green and blue of the light, from 0 to 1.
+    lamp
+        Where the light stands, seen from the robot: metres ahead, to its left, and up.
+
+    Examples
+    --------
+    >>> Look(walls="#404040").floor
+    ('#f0f0f0', '#2e5cc8')
+    """
+
+    floor: tuple[str, str] = ("#f0f0f0", "#2e5cc8")
+    walls: str = "#8c7a66"
+    ambient: float = 0.55
+    diffuse: float = 0.45
+    tint: Corner = (1.0, 1.0, 1.0)
+    lamp: Corner = (-0.5, 0.35, 1.0)
+
+
+def upright(yaw: float) -> tuple[float, float, float, float]:
+    """Return the quaternion of a turn by `yaw` degrees about the vertical.
+
+    >>> upright(0.0)
+    (0.0, 0.0, 0.0, 1.0)
+    """
+    return 0.0, 0.0, sin(radians(yaw) / 2), cos(radians(yaw) / 2)
 
 
 class Scene:
@@ -66,15 +108,28 @@ class Scene:
         The robot's body, and the constraint that drags it.
     doors
         The doors' bodies.
+    look
+        How the maze is painted and lit; `paint` changes it.
     """
 
     def __init__(self, layout: Layout, folder: Path) -> None:
         self.layout = layout
+        self.look = Look()
         self.client = connect()
+        # Else a texture is read once and never again, whatever its file has come to hold.
+        self.client.setPhysicsEngineParameter(enableFileCaching=0)
         self._floor = floor_mesh(layout.rows, layout.cols)
         self._walls = box_mesh(wall_boxes(layout))
         self._texture = folder / "floor.tga"
-        self._texture.write_bytes(tga(checker(layout.rows, layout.cols)))
+        self.paint(self.look)
+
+    def paint(self, look: Look) -> None:
+        """Paint and light the maze, and start afresh (`rebuild`)."""
+        self.look = look
+        picture = checker(self.layout.rows, self.layout.cols)
+        even = (picture == picture[0, 0]).all(axis=-1, keepdims=True)
+        first, second = (np.array(list(bytes.fromhex(colour[1:])), np.uint8) for colour in look.floor)
+        self._texture.write_bytes(tga(np.where(even, first, second)))
         self.rebuild()
 
     def rebuild(self) -> None:
@@ -88,21 +143,31 @@ class Scene:
         client.setTimeStep(TIME_STEP)
         client.setPhysicsEngineParameter(deterministicOverlappingPairs=1, erp=_STIFFNESS)
         self._obstacles: list[int] = []
-        self._shapes: dict[tuple[Kind, Size], tuple[int, int]] = {}
+        self._shapes: dict[tuple[Form, Size], tuple[int, int]] = {}
         self._add_floor()
         self._add_walls()
         self.doors = tuple(self._add_door(door) for door in sorted(self.layout.doors))
         self.robot, self.grip = self._add_robot()
 
-    def add(self, obstacle: Obstacle, cell: Cell) -> int:
-        """Put an obstacle at the centre of a cell and return its body."""
-        key = obstacle.kind, obstacle.size
+    def add(self, obstacle: Obstacle, cell: Cell, yaw: float = 0.0, form: Form | None = None) -> int:
+        """Put an obstacle at the centre of a cell and return its body.
+
+        Parameters
+        ----------
+        obstacle, cell
+            What is put where.
+        yaw
+            By how many degrees it is turned about the vertical.
+        form
+            The solid to show in place of its kind's.
+        """
+        key = form or obstacle.kind, obstacle.size
         if key not in self._shapes:
             self._shapes[key] = obstacle_shapes(self.client, *key)
         # A cube of mass 0 stays; a heavy one would creep when the robot nudges it.
         mass = 1.0 if obstacle.kind == "sphere" else 0.0
         body: int = self.client.createMultiBody(
-            mass, *self._shapes[key], (*centre(cell), RADIUS[obstacle.size])
+            mass, *self._shapes[key], (*centre(cell), height_of(*key)), upright(yaw)
         )
         self.client.changeVisualShape(body, -1, rgbaColor=rgba(obstacle.colour))
         self.client.changeDynamics(body, -1, lateralFriction=_FRICTION, rollingFriction=0.002)
@@ -152,8 +217,9 @@ class Scene:
             view.ravel(order="F").tolist(),
             projection.ravel(order="F").tolist(),
             lightDirection=light,
-            lightAmbientCoeff=0.55,
-            lightDiffuseCoeff=0.45,
+            lightColor=self.look.tint,
+            lightAmbientCoeff=self.look.ambient,
+            lightDiffuseCoeff=self.look.diffuse,
             lightSpecularCoeff=0.0,
             shadow=0,  # shadows paint moire stripes on floor and walls
             renderer=client.ER_TINY_RENDERER,
@@ -185,7 +251,7 @@ class Scene:
             vertices=walls.vertices,
             normals=walls.normals,
             indices=walls.indices,
-            rgbaColor=rgba(_WALLS),
+            rgbaColor=rgba(self.look.walls),
             specularColor=(0, 0, 0),
         )
         collision = client.createCollisionShape(

@@ -16,11 +16,12 @@ from typing import Final, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from worlds.bullet import Form
 from worlds.camera import RADIUS, Camera
 from worlds.geometry import cell_at, centre, heading
 from worlds.layout import Cell, Layout, Obstacle
 from worlds.maze import Change, Episode
-from worlds.scene import ROBOT_RADIUS, TIME_STEP, Scene
+from worlds.scene import ROBOT_RADIUS, TIME_STEP, Look, Scene
 
 TOLERANCE: Final = 0.02
 """Metres that the robot or an obstacle may be off the centre of its cell."""
@@ -28,8 +29,7 @@ _SUBSTEPS = 12  # physics steps in which the robot crosses a cell
 _SETTLE = 4  # physics steps after which it stands still
 _LEAD = 1.5  # how many times faster than the robot a pushed sphere rolls
 _NUDGE = 0.12  # metres that a stopped robot tries to go: short of the wall, cube or sphere ahead
-_LAMP = (-0.5, 0.35, 1.0)  # where the light stands, seen from the robot: behind, left, up
-_SUN = (-0.4, 0.5, 1.0)  # the same for the picture from above, in the world
+_SUN = (-0.4, 0.5, 1.0)  # where the light stands for the picture from above, in the world
 
 
 @dataclass(frozen=True)
@@ -147,16 +147,51 @@ class Twin:
         for obstacle in change.appeared:
             self._bodies[obstacle.name] = self._scene.add(obstacle, obstacle.cell)
 
+    def paint(self, look: Look) -> None:
+        """Paint and light the maze anew; what stood in it is gone, so stage or begin afterwards.
+
+        A twin that was painted shows nothing of what it went through before.
+        """
+        self._scene.paint(look)
+        self._bodies = {}
+        self._cell = None
+
     def stage(
-        self, robot_cell: Cell, action: int, obstacles: Iterable[Obstacle], *, doors_open: bool = False
+        self,
+        robot_cell: Cell,
+        action: int,
+        obstacles: Iterable[Obstacle],
+        *,
+        doors_open: bool = False,
+        yaws: Mapping[str, float] | None = None,
+        forms: Mapping[str, Form] | None = None,
     ) -> None:
         """Put the robot in a cell, facing along an action, among exactly these obstacles, at once.
 
         No physics runs: this is for rendering. An episode must be begun anew afterwards.
+
+        Parameters
+        ----------
+        robot_cell, action
+            Where the robot stands, and the action along which it faces.
+        obstacles
+            What stands in the maze.
+        doors_open
+            Whether the doors are open.
+        yaws
+            By obstacle's name, the degrees by which it is turned about the vertical; 0 if left out.
+        forms
+            By obstacle's name, the solid to show in place of its kind's.
         """
+        yaws, forms = yaws or {}, forms or {}
         self._scene.clear()
         self._cell = None
-        self._bodies = {obstacle.name: self._scene.add(obstacle, obstacle.cell) for obstacle in obstacles}
+        self._bodies = {
+            obstacle.name: self._scene.add(
+                obstacle, obstacle.cell, yaws.get(obstacle.name, 0.0), forms.get(obstacle.name)
+            )
+            for obstacle in obstacles
+        }
         self._scene.set_doors(doors_open=doors_open)
         self._heading = heading(action)
         self._scene.put_robot(*centre(robot_cell), self._heading)
@@ -169,8 +204,8 @@ class Twin:
         x, y = self._scene.position(self._scene.robot)
         view = self.camera.view(x, y, self._heading)
         east, north = self._heading
-        behind, left, up = _LAMP
-        light = (behind * east - left * north, behind * north + left * east, up)
+        ahead, left, up = self._scene.look.lamp
+        light = (ahead * east - left * north, ahead * north + left * east, up)
         return self._scene.image(self.camera.pixels, view, self.camera.projection, light)
 
     def overview(self, pixels: int = 480) -> NDArray[np.uint8]:

@@ -3,7 +3,8 @@
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from pathlib import Path
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -21,11 +22,25 @@ from comparisons.conformance import (
 from hierarchy import Call, Constant, GroundGraph, Predicate, TaskGraph, two_rooms
 from hierarchy.taxi import taxi_graph
 from hierarchy.terms import Equal
-from perception import NOTHING, Detection, View, load_backend
+from perception import NOTHING, Detection, View, backend_names, load_backend
 from perception.frames import fresh_views
+from perception.models import Card, load_model, save_model
+from perception.percepts import Percepts, Sees, checked_frames
+from perception.protocol import Frames
 from planners import HSMQ, MaxQ, MaxQQ
 from planners.learner import Trace
-from worlds import ACTIONS, Cell, StateIndex, TransitionModel, Variable, finite_world, load_layout, maze_model
+from worlds import (
+    ACTIONS,
+    Cell,
+    StateIndex,
+    Stream,
+    TransitionModel,
+    UserError,
+    Variable,
+    finite_world,
+    load_layout,
+    maze_model,
+)
 from worlds.black_box import BlackBox
 from worlds.camera import Camera
 from worlds.gym_model import gym_model
@@ -36,13 +51,18 @@ MODEL = maze_model(MAZE)
 
 
 def test_ours_conform() -> None:
-    """The paper's world and graph, MAXQ-0 and the Hough backend pass."""
+    """The paper's world and graph, and the tabular learners, pass."""
     check_world(MODEL)
     check_graph(two_rooms(MAZE), MODEL)
     for learner in (MaxQ, MaxQQ, HSMQ):
         check_learner(learner)
+
+
+@pytest.mark.parametrize("name", backend_names())
+def test_every_backend_conforms(name: str) -> None:
+    """Each registered backend passes on frames of the twin."""
     camera = Camera(pixels=96)
-    check_backend(load_backend("hough", camera), list(fresh_views(MAZE, 6, seed=1, camera=camera)))
+    check_backend(load_backend(name, camera), list(fresh_views(MAZE, 6, seed=1, camera=camera)))
 
 
 def test_a_world_without_starts_or_with_endless_rewards_is_refused() -> None:
@@ -352,16 +372,22 @@ class Moody:
 
     def __init__(self, fault: str) -> None:
         self.fault = fault
+        self.calls = 0
 
     def detect(self, views: Sequence[View]) -> list[Detection]:
         """Return detections that are wrong in one way."""
         found = [NOTHING] * len(views)
+        self.calls += 1
         if self.fault == "short":
             return found[1:]
         if self.fault == "company" and len(views) > 1:
             found[0] = replace(NOTHING, confidence=0.5)
+        if self.fault == "tired" and self.calls > 3:
+            found[-1] = replace(NOTHING, confidence=0.5)
         if self.fault == "paints" and views and views[0].frame is not None:
             views[0].frame[:] = 0
+        if self.fault == "dreams" and not views:
+            return [NOTHING]
         return found
 
 
@@ -370,7 +396,9 @@ class Moody:
     [
         ("short", "2 views got 1 detections"),
         ("company", "view 0 got another detection alone"),
+        ("tired", "view 0 got another detection after others; keep nothing"),
         ("paints", "the frame of view 0 was changed"),
+        ("dreams", "no views must give no detections"),
     ],
 )
 def test_a_backend_that_breaks_a_promise_is_refused(fault: str, message: str) -> None:
@@ -378,3 +406,120 @@ def test_a_backend_that_breaks_a_promise_is_refused(fault: str, message: str) ->
     views = [View(np.full((4, 4, 3), 9, np.uint8), NOTHING) for _ in range(2)]
     with pytest.raises(ConformanceError, match=message):
         check_backend(Moody(fault), views)
+
+
+VIEWS = [View(np.full((16, 16, 3), shade, np.uint8), NOTHING) for shade in (0, 100, 200)]
+
+
+class Shades(Sees):
+    """A backend that learns a shade, with one fault."""
+
+    name = "shades"
+    fits = 0
+
+    def __init__(self, fault: str = "", shade: float = 128.0) -> None:
+        self.fault = fault
+        self.shade = shade
+
+    @classmethod
+    def fitted(cls, fault: str, seed: int) -> Self:
+        """Learn the shade that the seed draws."""
+        cls.fits += 1
+        return cls(fault, Stream(seed, cls.fits if fault == "forgets its seed" else 0).between(50, 200))
+
+    def perceive(self, frames: Frames) -> Percepts:
+        """Call what is darker than the shade a sphere, and what is brighter a cube."""
+        match self.fault:
+            case "swallows":
+                if not isinstance(frames, np.ndarray) or frames.ndim != 4 or len(frames) == 0:
+                    return Percepts(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
+                frames = frames[..., :3].astype(np.uint8)
+            case "stumbles":
+                assert frames.dtype, "a list has none"
+                checked_frames(frames)
+            case _:
+                checked_frames(frames)
+        sphere = np.clip(self.shade / (self.shade + frames.mean(axis=(1, 2, 3))), 0, 1)
+        chances = np.column_stack([np.zeros(len(frames)), 1 - sphere, sphere])
+        if self.fault == "paints":
+            frames[:] = 7
+        return Percepts(chances, np.ones(len(frames)), np.zeros(len(frames)))
+
+    def detect(self, views: Sequence[View]) -> list[Detection]:
+        """Return detections, at another distance than perceived if that is the fault."""
+        found = super().detect(views)
+        return [replace(seen, distance=2) for seen in found] if self.fault == "contradicts" else found
+
+    def save(self, path: Path) -> None:
+        """Write the shade."""
+        shade = 1.0 if self.fault == "forgets" else self.shade
+        save_model(path, {"shade": np.array([shade])}, Card("shades", "nothing", 0))
+
+    @classmethod
+    def load(cls, path: Path, camera: Camera) -> Self:
+        """Read the shade."""
+        assert camera.pixels
+        try:
+            return cls(shade=float(load_model(path, "shades", {"shade": (1,)})[0]["shade"][0]))
+        except UserError:
+            if cls.fits < 0:
+                return cls()
+            raise
+
+
+def test_a_backend_of_ones_own_passes() -> None:
+    """Frames, refusals, saving and fitting are as they should be."""
+    check_backend(Shades(), VIEWS, fit=lambda seed: Shades.fitted("", seed))
+
+
+@pytest.mark.parametrize(
+    ("fault", "message"),
+    [
+        ("swallows", "floats must be refused"),
+        ("stumbles", "a list must be refused by a UserError, not AttributeError"),
+        ("paints", "perceive changes the frames"),
+        ("contradicts", "perceive and detect tell frame 0 differently"),
+        ("forgets", "sees otherwise once saved and loaded"),
+        ("forgets its seed", "fitted twice with one seed it sees otherwise"),
+    ],
+)
+def test_a_backend_on_frames_that_breaks_a_promise_is_refused(fault: str, message: str) -> None:
+    """What comes in, what comes out, what is kept on disk and what a seed gives are held."""
+    with pytest.raises(ConformanceError, match=message):
+        check_backend(Shades(fault), VIEWS, fit=lambda seed: Shades.fitted(fault, seed))
+
+
+def test_a_backend_that_loads_broken_weights_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half a weights file must not become a backend."""
+    monkeypatch.setattr(Shades, "fits", -1)
+    with pytest.raises(ConformanceError, match="a broken weights file must be refused"):
+        check_backend(Shades(), VIEWS)
+
+
+def test_probabilities_that_do_not_bear_out_the_label_are_refused() -> None:
+    """A detection of another make is held to the same sums."""
+
+    class Odd(Detection):
+        """A detection whose chances are whatever it is made with."""
+
+        @property
+        def chances(self) -> tuple[float, float, float]:
+            """Say nothing that sums to 1."""
+            return (0.9, 0.9, 0.0) if self.confidence == 1 else (0.25, 0.75, 0.0)
+
+    class Makes(Moody):
+        """Makes odd detections."""
+
+        def detect(self, views: Sequence[View]) -> list[Detection]:
+            """Return them."""
+            return [Odd("none", 1.0 if self.fault == "sum" else 0.5, 0) for _ in views]
+
+    for fault, message in (("sum", "sum to 1.8, not 1"), ("label", "is called 'none' with probabilities")):
+        with pytest.raises(ConformanceError, match=message):
+            check_backend(Makes(fault), VIEWS)
+
+
+def test_what_is_no_backend_is_refused() -> None:
+    """It is told what is missing."""
+    with pytest.raises(ConformanceError, match="str has no name, needs_frames or detect"):
+        check_backend("hough", VIEWS)  # type: ignore[arg-type]

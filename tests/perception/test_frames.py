@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from numpy.typing import NDArray
 
 from perception import Detection
 from perception.frames import fresh_scene, fresh_views
-from worlds import MazeState, UserError, ahead, load_layout, parse_layout
+from worlds import Cell, MazeState, Obstacle, UserError, ahead, load_layout, parse_layout
+from worlds.bullet import Form, turned_mesh
 from worlds.camera import Camera
+from worlds.scene import Look
+from worlds.twin import Twin
 
 MAZE = load_layout("two_rooms")
 
@@ -77,3 +81,56 @@ def test_maze_without_room_is_refused() -> None:
     lone = replace(pair, solid=frozenset([pair.triggers["T1"]]))
     with pytest.raises(UserError, match="two free cells"):
         [fresh_scene(lone, 1, number) for number in range(3)]
+
+
+CUBE = Obstacle("box", "cube", Cell(3, 1))
+
+
+def staged(twin: Twin, yaw: float = 0.0, form: Form = "cube") -> NDArray[np.uint8]:
+    """Return what the robot sees of a cube, or another solid, two cells ahead."""
+    twin.stage(Cell(5, 1), 0, [CUBE], yaws={"box": yaw}, forms={"box": form})
+    return twin.frame()
+
+
+def test_paint_light_turn_and_form_show_and_go_again() -> None:
+    """Each changes the frame; painted as the paper has it, the twin shows what a new one shows."""
+    with Twin(MAZE, Camera(pixels=48)) as twin:
+        plain = staged(twin)
+        looks = [
+            Look(floor=("#f0f0f0", "#20c83c")),
+            Look(floor=("#101010", "#2e5cc8")),
+            Look(walls="#ff0000"),
+            Look(ambient=0.3),
+            Look(diffuse=0.2),
+            Look(tint=(1.0, 0.5, 0.5)),
+            Look(lamp=(-0.5, -0.9, 1.0)),
+        ]
+        seen = [plain, staged(twin, yaw=30.0), staged(twin, form="dome")]
+        for look in looks:
+            twin.paint(look)
+            seen.append(staged(twin))
+        assert len({frame.tobytes() for frame in seen}) == len(seen)
+        twin.paint(Look())
+        assert np.array_equal(staged(twin), plain)
+
+
+def test_the_floor_has_the_colours_it_is_given() -> None:
+    """In full ambient light the two cells ahead are of just the two colours, cell (0, 0) the first."""
+    with Twin(MAZE, Camera(pixels=48)) as twin:
+        twin.paint(Look(floor=("#c80000", "#006400"), ambient=1.0, diffuse=0.0))
+        twin.stage(Cell(5, 1), 0, [])  # (4, 1) ahead is odd, (3, 1) even
+        frame = twin.frame()
+        near, far = frame[-2, 24], frame[22, 24]
+        assert near.tolist() == pytest.approx([0, 100, 0], abs=3)
+        assert far.tolist() == pytest.approx([200, 0, 0], abs=3)
+
+
+def test_a_turned_solid_is_closed_and_its_normals_look_outwards() -> None:
+    """A cylinder's triangles add up to its volume, counted outwards, as the divergence theorem has it."""
+    mesh = turned_mesh([(0.5, -1.0), (0.5, 1.0)], 64)
+    corners = np.array(mesh.vertices)[np.array(mesh.indices).reshape(-1, 3)]
+    normals = np.array(mesh.normals)[np.array(mesh.indices).reshape(-1, 3)[:, 0]]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert (across * normals).sum(axis=1).min() > 0
+    volume = (corners[:, 0] * across).sum() / 6
+    assert volume == pytest.approx(np.pi * 0.25 * 2, rel=0.01)

@@ -11,6 +11,7 @@ from perception.pushing import (
     FRICTIONS,
     LABELS,
     SPEEDS,
+    PushRange,
     PushResult,
     agreement,
     mass_of,
@@ -19,6 +20,7 @@ from perception.pushing import (
     rollable,
 )
 from worlds import KINDS, SIZES, Kind, Size
+from worlds.bullet import UNKNOWN_FORMS, Form
 
 
 @pytest.fixture(scope="module")
@@ -122,10 +124,13 @@ def test_a_seed_repeats_its_trials(trials: tuple[PushResult, ...]) -> None:
     friction=st.floats(0.02, 1.0),
     speed=st.floats(0.25, 1.0),
     offset=st.floats(-0.05, 0.05),
+    yaw=st.floats(0.0, 360.0),
 )
-def test_any_push_is_consistent(kind: Kind, size: Size, friction: float, speed: float, offset: float) -> None:
+def test_any_push_is_consistent(
+    kind: Kind, size: Size, friction: float, speed: float, *, offset: float, yaw: float
+) -> None:
     """No obstacle ends farther than its path, and no cube rolls, whatever the push."""
-    result = push_trial(kind, size, friction, speed, offset=offset)
+    result = push_trial(kind, size, friction, speed, offset=offset, yaw=yaw)
     assert result.displacement <= result.path + 1e-9
     assert 0 <= result.tilt <= 180
     assert not (result.rolled and not rollable(result.kind))
@@ -142,3 +147,31 @@ def test_mass_follows_from_volume() -> None:
     """A cube of 0.5 m is an eighth of a cubic metre; the sphere in it is pi / 6 of that."""
     assert mass_of("cube", "middle") == pytest.approx(DENSITY / 8)
     assert mass_of("sphere", "middle") / mass_of("cube", "middle") == pytest.approx(0.5236, abs=1e-4)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_the_robot_starts_clear_of_a_turned_cube(size: Size) -> None:
+    """Pushed along its diagonal or along its side a fixed cube is never moved nor burst out of a contact."""
+    for yaw in (0.0, 20.0, 45.0, 90.0):
+        assert push_trial("cube", size, friction=0.02, mass=0, yaw=yaw).path == 0.0
+    light = push_trial("cube", size, friction=0.02, speed=0.1, mass=5, yaw=45.0)
+    assert light.label == "slides"
+    assert light.path < 1.8  # the robot goes 1 m; what overlapped at the start would shoot off
+
+
+@pytest.mark.parametrize("form", UNKNOWN_FORMS)
+def test_solids_on_a_flat_base_do_not_roll(form: Form) -> None:
+    """Whatever the floor, a solid that is neither cube nor sphere slides, topples or stays."""
+    with PushRange() as pushes:
+        results = [pushes.push(form, "small", friction, 0.5, yaw=30.0) for friction in (0.02, 0.3, 0.9)]
+    assert not any(result.rolled or rollable(result.kind) for result in results)
+    assert results[0].label == "slides"
+
+
+def test_pushes_on_one_range_are_apart() -> None:
+    """A push comes out the same to the last bit whatever was pushed before it."""
+    with PushRange() as pushes:
+        first = pushes.push("cube", "small", 0.3, 0.5, yaw=10.0)
+        pushes.push("sphere", "large", 0.1, 1.0)
+        again = pushes.push("cube", "small", 0.3, 0.5, yaw=10.0)
+    assert first == again == push_trial("cube", "small", 0.3, 0.5, yaw=10.0)

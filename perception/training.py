@@ -1,0 +1,264 @@
+"""How the CNN learns: AdamW under one cycle of the learning rate, on frames spoilt at random.
+
+The same data, seed and settings give the same bits on one machine: weights, order and augmentation are drawn
+from streams of the seed, and one thread does the sums.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Final, Protocol
+
+import cv2
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch.nn import functional
+
+from perception.augmentation import Augmentation, augment, generator
+from perception.network import PIXELS, Network
+from perception.percepts import checked_frames
+from perception.protocol import LABELS, REACH, Frames
+from worlds import UserError
+
+_EVERY: Final = 10  # frames, of which one is kept for tuning
+_LEAST_UPDATES: Final = 10
+_INIT, _ORDER, _SPOIL, _DROP = range(4)  # what a stream of the seed is for
+
+
+class Labelled(Protocol):
+    """Frames and what stands ahead in each, such as `perception.data.PushedFrames`.
+
+    `frames` are uint8, shape (frames, rows, columns, 3); `labels` places in `LABELS`, and `distances` cells
+    from 1 to `REACH`, of which those of frames with nothing ahead are not read; both shape (frames,).
+    """
+
+    @property
+    def frames(self) -> Frames:
+        """The frames."""
+        ...
+
+    @property
+    def labels(self) -> NDArray[np.int64]:
+        """The label of each, by its place in `LABELS`."""
+        ...
+
+    @property
+    def distances(self) -> NDArray[np.int64]:
+        """The obstacle's distance in each, in cells."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Some rows of labelled data; see `Labelled` for the fields."""
+
+    frames: Frames
+    labels: NDArray[np.int64]
+    distances: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, data: Labelled, rows: NDArray[np.int64] | slice = slice(None)) -> Rows:
+        """Return some rows of data."""
+        return cls(data.frames[rows], data.labels[rows], data.distances[rows])
+
+
+@dataclass(frozen=True)
+class Training:
+    """How long and how fast the network learns.
+
+    Parameters
+    ----------
+    updates
+        Steps of the optimiser, however many frames there are; at least 10, for the rate to rise and fall.
+    batch
+        Frames a step.
+    rate
+        The learning rate's top.
+    decay
+        Weight decay.
+    smoothing
+        Share of each label that is spread over all.
+    distance
+        Weight of the distance's loss beside the label's.
+    augmentation
+        How the frames are spoilt.
+
+    Raises
+    ------
+    UserError
+        If there are too few updates, or no frames in a batch.
+    """
+
+    updates: int = 3400
+    batch: int = 64
+    rate: float = 3e-3
+    decay: float = 0.02
+    smoothing: float = 0.02
+    distance: float = 0.2
+    augmentation: Augmentation = field(default_factory=Augmentation)
+
+    def __post_init__(self) -> None:
+        if self.updates < _LEAST_UPDATES or self.batch < 2:
+            raise UserError(
+                f"training takes at least {_LEAST_UPDATES} updates of at least 2 frames, "
+                f"not {self.updates} of {self.batch}"
+            )
+
+
+def train(
+    data: Labelled,
+    seed: int,
+    settings: Training | None = None,
+    *,
+    device: str = "cpu",
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Train a network and return its folded tensors.
+
+    Parameters
+    ----------
+    data
+        What it learns from.
+    seed
+        Names the run.
+    settings
+        Defaults to ``Training()``.
+    device
+        Where torch computes.
+    progress
+        Called with the share of the steps that is done.
+
+    Raises
+    ------
+    UserError
+        If the data are no batch of frames with labels and distances.
+    """
+    settings = Training() if settings is None else settings
+    frames, labels, distances = (tensor.to(device) for tensor in _prepared(data))
+    # Torch's own generator, which initialises layers and drops parts of them, is left as it was.
+    with one_thread(), torch.random.fork_rng(devices=[]):
+        network = Network().to("cpu")
+        network.draw(generator(seed, _INIT))
+        network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        optimiser = torch.optim.AdamW(network.parameters(), lr=settings.rate, weight_decay=settings.decay)
+        schedule = torch.optim.lr_scheduler.OneCycleLR(
+            optimiser, settings.rate, total_steps=settings.updates, pct_start=0.2
+        )
+        network.train()
+        torch.manual_seed(generator(seed, _DROP).initial_seed())
+        for step, chosen in enumerate(_batches(len(frames), seed, settings)):
+            here = chosen.to(device)
+            seen = augment(frames[here].float() / 255, settings.augmentation, generator(seed, _SPOIL, step))
+            found = network(seen.contiguous(memory_format=torch.channels_last))
+            loss = _loss(found, labels[here], distances[here], settings)
+            optimiser.zero_grad()
+            loss.backward()  # type: ignore[no-untyped-call]
+            optimiser.step()
+            schedule.step()
+            if progress is not None:
+                progress((step + 1) / settings.updates)
+        network.eval()
+        return network.folded()
+
+
+def resized(frames: Frames, pixels: int = PIXELS) -> Frames:
+    """Return frames of `pixels` rows and columns, by the mean of the areas that fall together.
+
+    Examples
+    --------
+    >>> resized(np.zeros((2, 96, 96, 3), np.uint8)).shape
+    (2, 64, 64, 3)
+    """
+    if frames.shape[1:3] == (pixels, pixels):
+        return frames
+    shrinks = min(frames.shape[1:3]) >= pixels
+    way = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
+    small = np.empty((len(frames), pixels, pixels, 3), np.uint8)
+    for frame, out in zip(frames, small, strict=True):
+        cv2.resize(np.ascontiguousarray(frame), (pixels, pixels), dst=out, interpolation=way)
+    return small
+
+
+def checked_data(data: Labelled) -> None:
+    """Refuse data that are no frames with a label and a distance each.
+
+    Raises
+    ------
+    UserError
+        If they are not; the message says what came and what is wanted.
+    """
+    count = len(checked_frames(data.frames))
+    labels, distances = np.asarray(data.labels), np.asarray(data.distances)
+    if labels.shape != (count,) or distances.shape != (count,):
+        raise UserError(
+            f"{count} frames need as many labels and distances, not {labels.shape} and {distances.shape}"
+        )
+    if labels.min() < 0 or labels.max() >= len(LABELS):
+        raise UserError(
+            f"labels are 0 to {len(LABELS) - 1} ({', '.join(LABELS)}), not {labels.min()} to {labels.max()}"
+        )
+    far = distances[labels > 0]
+    if len(far) and (far.min() < 1 or far.max() > REACH):
+        raise UserError(f"distances of obstacles are 1 to {REACH} cells, not {far.min()} to {far.max()}")
+
+
+def held_out(data: Labelled) -> tuple[Rows, Rows]:
+    """Return data to learn from, and every tenth frame to tune on; all for both where there are fewer.
+
+    Examples
+    --------
+    >>> data = Rows(np.zeros((20, 8, 8, 3), np.uint8), np.zeros(20, np.int64), np.ones(20, np.int64))
+    >>> [len(part.frames) for part in held_out(data)]
+    [18, 2]
+    """
+    checked_data(data)
+    numbers = np.arange(len(data.frames))
+    kept = numbers % _EVERY == _EVERY - 1
+    if not kept.any():
+        return Rows.of(data), Rows.of(data)
+    return Rows.of(data, numbers[~kept]), Rows.of(data, numbers[kept])
+
+
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Let torch use one thread meanwhile: the order of sums, and so their last bits, then stay the same."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def _prepared(data: Labelled) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    checked_data(data)
+    frames = torch.from_numpy(resized(data.frames)).permute(0, 3, 1, 2).contiguous()
+    # Distances count from 0 here, as scores do; those of frames with nothing ahead are not read.
+    labels, distances = (
+        torch.tensor(np.array(values, dtype=np.int64)) for values in (data.labels, data.distances)
+    )
+    return frames, labels, (distances - 1).clamp(0, REACH - 1)
+
+
+def _batches(count: int, seed: int, settings: Training) -> Iterator[torch.Tensor]:
+    """Yield the frames of each step: every frame once, in a random order, then again in another."""
+    left, epoch = torch.empty(0, dtype=torch.int64), 0
+    for _ in range(settings.updates):
+        while len(left) < settings.batch:
+            left = torch.cat([left, torch.randperm(count, generator=generator(seed, _ORDER, epoch))])
+            epoch += 1
+        yield left[: settings.batch]
+        left = left[settings.batch :]
+
+
+def _loss(
+    found: torch.Tensor, labels: torch.Tensor, distances: torch.Tensor, settings: Training
+) -> torch.Tensor:
+    kinds, cells = found[:, : len(LABELS)], found[:, len(LABELS) :]
+    loss = functional.cross_entropy(kinds, labels, label_smoothing=settings.smoothing)
+    there = (labels > 0).to(found.dtype)
+    far = functional.cross_entropy(cells, distances, reduction="none")
+    return loss + settings.distance * (far * there).sum() / there.sum().clamp(min=1)
