@@ -45,11 +45,7 @@ Cell = tuple[int, int]
 
 def uniform(seed: int, *shape: int) -> NDArray[np.float64]:
     """Return the draws of a stream, all at once."""
-    x = np.arange(1, int(np.prod(shape)) + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
-    x += np.uint64(Stream(seed).key)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return ((x ^ (x >> np.uint64(31))) >> np.uint64(11)).reshape(shape) * 2.0**-53
+    return Stream(seed).uniforms(int(np.prod(shape))).reshape(shape)
 
 
 def maze(side: int, more: float = 0.0) -> Free:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final, Protocol, TypeVar
+from typing import Final, TypeVar
 
 from comparisons.dynamic import Tally, judge, random_episode
 from comparisons.eyes import Sight
 from comparisons.learning import Curve, PairLearner
+from comparisons.outputs import Track
 from comparisons.robot import Moment, Robot, Run
 from hierarchy import GroundGraph, ValueCounts, checked, two_rooms, value_counts
 from perception.accuracy import Accuracy, measure
@@ -25,13 +26,6 @@ T = TypeVar("T")
 
 RUNS: Final = 100
 """Runs of every pair, each with a seed of its own; the first has the experiment's."""
-
-
-class Track(Protocol):
-    """Shows progress over items, such as `rich.progress.Progress.track`."""
-
-    def __call__(self, items: Iterable[T], *, total: int, description: str) -> Iterable[T]:
-        """Yield the items, counting them."""
 
 
 @dataclass(frozen=True)

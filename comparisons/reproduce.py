@@ -2,27 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import shutil
-import tempfile
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from time import process_time
-from typing import TypeVar
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from comparisons.experiment import Experiment, Spec, Track
+from comparisons.experiment import Experiment, Spec
+from comparisons.outputs import new_directory, progress_on, refuse_existing, track_with, write_json
 from comparisons.report import render
 from comparisons.results import find, results
 from comparisons.story import tell
 from comparisons.style import picture
 from hierarchy import mermaid
-from worlds import UserError
-
-T = TypeVar("T")
 
 
 def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
@@ -50,10 +41,10 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
     UserError
         If `out` exists or cannot be made, or the spec names a layout or backend that there is not.
     """
-    _refuse_existing(out)
-    progress = _progress(console)
-    experiment = Experiment(spec, _track(progress))
-    with _new_directory(out) as directory, progress:
+    refuse_existing(out)
+    progress = progress_on(console)
+    experiment = Experiment(spec, track_with(progress))
+    with new_directory(out) as directory, progress:
         begun = process_time()
         found = find(experiment)
         searched = process_time()
@@ -67,42 +58,6 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
         (directory / "task_graph.mmd").write_text(mermaid(experiment.grounded.graph), encoding="utf-8")
         (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
         times = {"experiment": searched - begun, "report": process_time() - searched}
-        for name, data in (("results", content), ("times", times)):
-            text = json.dumps(data, indent=2, ensure_ascii=False) + "\n"
-            (directory / f"{name}.json").write_text(text, encoding="utf-8")
+        write_json(directory / "results.json", content)
+        write_json(directory / "times.json", times)
     return content
-
-
-def _refuse_existing(out: Path) -> None:
-    if out.exists() or out.is_symlink():
-        raise UserError(f"--out {out}: it exists already; name a new directory, or remove this one")
-
-
-@contextmanager
-def _new_directory(out: Path) -> Iterator[Path]:
-    """Yield a directory that takes the name `out` if all goes well, and vanishes if not."""
-    try:
-        parent = out.absolute().parent
-        parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=parent))
-    except OSError as error:
-        raise UserError(f"--out {out}: it cannot be made ({error.strerror}); name another place") from error
-    try:
-        yield made
-        made.chmod(0o755)
-        _refuse_existing(out)
-        made.rename(out)
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
-
-
-def _track(progress: Progress) -> Track:
-    def track(items: Iterable[T], *, total: int, description: str) -> Iterable[T]:
-        return progress.track(items, total=total, description=description)
-
-    return track
-
-
-def _progress(console: Console) -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console)
