@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated
@@ -11,6 +12,7 @@ from typing import Annotated
 from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
+from comparisons.stopping import orderly_exit
 from worlds.errors import UserError
 
 app = App(
@@ -116,8 +118,15 @@ def compare_perception(
     episodes: int | None = None,
     seed: int = 200,
     quick: bool = False,
+    learning: bool = True,
+    training_seeds: int | None = None,
+    effort: float | None = None,
+    workers: int | None = None,
 ) -> int:
-    """Compare perception backends: accuracy, calibration, latency, and what mistakes cost in the task.
+    """Compare perception backends: accuracy, calibration, latency, learning, and what mistakes cost.
+
+    Backends that learn are also trained anew, on few pushes and many, on wrong labels, and with colours,
+    distances and sizes kept out; --no-learning leaves that out.
 
     Parameters
     ----------
@@ -132,20 +141,32 @@ def compare_perception(
     seed
         Of the frames, 200 to 299; the seeds below train and tune.
     quick
-        Fewer frames, episodes and severities, for a first look.
+        Fewer frames, episodes, severities and trainings, and short ones, for a first look.
+    learning
+        Whether backends are trained anew.
+    training_seeds
+        How many times each training is done, with other pushes; 0 leaves them out. Defaults to 3, or 1 if
+        quick.
+    effort
+        Length of each training, as a share of the usual number of steps. Defaults to 0.3, or 0.02 if quick.
+    workers
+        Processes that train; their number changes nothing in the results. Defaults to one for each core.
     """
     from comparisons.perception_compare import compare_perception as run
     from comparisons.perception_compare import summarise_perception
-    from comparisons.perception_study import StudySpec
+    from comparisons.perception_spec import QUICK, LearningSpec, StudySpec
 
+    usual = QUICK if quick else LearningSpec()
+    seeds = usual.seeds if training_seeds is None else training_seeds
     spec = StudySpec(
         backends,
         seed,
         (90 if quick else 1000) if frames is None else frames,
         (20 if quick else 200) if episodes is None else episodes,
         (1, 3, 5) if quick else (1, 2, 3, 4, 5),
+        replace(usual, seeds=seeds if learning else 0, effort=usual.effort if effort is None else effort),
     )
-    print(summarise_perception(run(spec, out, Console(stderr=True))))
+    print(summarise_perception(run(spec, out, Console(stderr=True), workers)))
     print(f"report: {out / 'report.html'}")
     return 0
 
@@ -249,13 +270,17 @@ def maze(
 
 
 def main(tokens: Sequence[str] | None = None) -> None:
-    """Run the command line; a user's mistake is one message and exit status 2, never a traceback."""
+    """Run the command line; a user's mistake is one message and exit status 2, never a traceback.
+
+    Ctrl-C ends it with status 130 and SIGTERM with 143; what was half-made is taken away first.
+    """
     try:
-        status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+        with orderly_exit():
+            status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
     except (CycloptsError, UserError) as error:
         print(f"affordant: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
-        print("affordant: stopped; nothing was written", file=sys.stderr)
+        print("affordant: stopped", file=sys.stderr)
         sys.exit(130)
     sys.exit(status or 0)

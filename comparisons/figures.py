@@ -5,7 +5,8 @@ They use no pyplot and no global state, and the same data gives the same bytes (
 
 from comparisons.figures_graph import task_graph_figure
 from comparisons.figures_learning import band, convergence_figure, step_tables_figure, value_counts_figure
-from comparisons.figures_perception import confusion_figure, detections_figure, push_figure
+from comparisons.figures_perception import confusion_figure, detections_figure
+from comparisons.figures_pushes import push_figure
 from comparisons.figures_routes import counterexample_figure, layout_figure, trajectories_figure
 from comparisons.style import save_figure
 

@@ -1,4 +1,4 @@
-"""Figures of perception: confusion, push trials, what a backend saw (figure 11), and backends compared."""
+"""Figures of perception: confusion, what a backend saw (figure 11), and backends compared."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from comparisons.style import (
     ORANGE,
     PALE,
     PLUM,
-    PURPLE,
     SKY,
     VERMILION,
     grid_of,
@@ -80,43 +79,6 @@ def confusion_figure(matrix: Sequence[Sequence[int]], labels: Sequence[str]) -> 
     axes.set_xlabel("seen as")
     axes.set_ylabel("is in truth (frames)")
     axes.spines[:].set_visible(False)
-    return figure
-
-
-@styled
-def push_figure(counts: Mapping[str, Mapping[str, int]]) -> Figure:
-    """Draw what pushed obstacles did: a panel for each kind, a bar for each behaviour.
-
-    Parameters
-    ----------
-    counts
-        Per kind, trials by behaviour (rolls, slides, topples, stays).
-
-    Examples
-    --------
-    >>> figure = push_figure({"cube": {"rolls": 0, "slides": 5}, "sphere": {"rolls": 6}})
-    >>> [axes.get_title(loc="left") for axes in figure.axes]
-    ['cube (5 trials)', 'sphere (6 trials)']
-    """
-    labels = list(dict.fromkeys(label for by_label in counts.values() for label in by_label))
-    palette = (BLUE, ORANGE, GREEN, PURPLE, SKY, VERMILION)
-    colours = [palette[i % len(palette)] for i in range(len(labels))]
-    rows, columns = grid_of(len(counts), 3)
-    figure = Figure((0.6 + 2.9 * columns, rows * (0.75 + 0.27 * len(labels))), layout="constrained")
-    most = max((max(by_label.values(), default=0) for by_label in counts.values()), default=0)
-    places = np.arange(len(labels))
-    for i, (kind, by_label) in enumerate(counts.items()):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        trials = [by_label.get(label, 0) for label in labels]
-        bars = axes.barh(places, trials, height=0.68, color=colours)
-        axes.bar_label(bars, padding=3, color=INK)
-        axes.set_yticks(places, labels if i % columns == 0 else [""] * len(labels), color=INK)
-        axes.invert_yaxis()
-        axes.set_xlim(0, 1.14 * max(most, 1))
-        axes.set_title(f"{kind} ({sum(trials)} trials)", loc="left")
-        axes.tick_params(axis="y", length=0)
-        if i // columns == rows - 1:
-            axes.set_xlabel("trials")
     return figure
 
 

@@ -36,10 +36,11 @@ class Learns(Backend, Protocol):
         seed: int,
         *,
         tuning: Any = None,
+        effort: float = 1.0,
         about: str | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Self:
-        """Learn anew."""
+        """Learn anew; `effort` is the length of the training as a share of the usual one."""
         ...
 
     def save(self, path: Path | str) -> None:
@@ -49,6 +50,15 @@ class Learns(Backend, Protocol):
     @classmethod
     def load(cls, path: Path | str, camera: Camera | None = None) -> Self:
         """Return what was written."""
+        ...
+
+
+@runtime_checkable
+class Gates(Learns, Protocol):
+    """A backend that is a gate on the CNN: given one that has learnt, it need not train its own."""
+
+    def gate(self, cnn: Any, kept: Any) -> Self:
+        """Take over the network, and set the gate by frames that it did not learn from."""
         ...
 
 

@@ -9,16 +9,20 @@ from typing import Any
 from rich.console import Console
 
 from comparisons.outputs import new_directory, progress_on, refuse_existing, track_with, write_json
+from comparisons.perception_learning import Learning, learn, learners
 from comparisons.perception_looks import see
 from comparisons.perception_price import Task
 from comparisons.perception_report import perception_results, tell_perception
-from comparisons.perception_study import StudySpec, load_backends
-from comparisons.report import render
-from comparisons.style import picture
+from comparisons.perception_spec import StudySpec
+from comparisons.perception_study import load_backends
+from comparisons.report import write_report
+from comparisons.spread import checked_workers
 from worlds.camera import Camera
 
 
-def compare_perception(spec: StudySpec, out: Path, console: Console) -> dict[str, Any]:
+def compare_perception(
+    spec: StudySpec, out: Path, console: Console, workers: int | None = None
+) -> dict[str, Any]:
     """Compare backends and write what comes of it to a new directory.
 
     The directory appears only once everything in it is complete: ``report.html``, ``results.json``,
@@ -32,6 +36,8 @@ def compare_perception(spec: StudySpec, out: Path, console: Console) -> dict[str
         The directory to make; it must not exist.
     console
         Where progress is shown.
+    workers
+        Processes that train; their number changes nothing in the results. Defaults to one for each core.
 
     Returns
     -------
@@ -44,20 +50,18 @@ def compare_perception(spec: StudySpec, out: Path, console: Console) -> dict[str
         If `out` exists or cannot be made, or the spec names a backend that cannot be compared.
     """
     refuse_existing(out)
+    workers = checked_workers(workers)
     backends = load_backends(spec.backends, Camera())
     progress = progress_on(console)
     track = track_with(progress)
     with new_directory(out) as directory, progress:
         seen = see(spec, backends, track)
         prices = Task(spec, track).prices(backends) if spec.episodes else ()
-        content = perception_results(spec, seen, prices)
-        report, figures = tell_perception(spec, seen, prices)
-        (directory / "figures").mkdir()
-        pictures = {}
-        for name in progress.track(figures, description="drawing figures"):
-            pictures[name] = picture(figures[name])
-            pictures[name].save(directory / "figures", name)
-        (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
+        names = learners(backends) if spec.learning.seeds else ()
+        learning = learn(spec, names, track, workers) if names else Learning((), (), {})
+        content = perception_results(spec, seen, prices, learning)
+        report, figures = tell_perception(spec, seen, prices, learning)
+        write_report(report, figures, directory, track)
         write_json(directory / "results.json", content)
         write_json(directory / "times.json", {name: median(times) for name, times in seen.latency.items()})
     return content

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from comparisons.outputs import Track
+from comparisons.perception_spec import StudySpec
 from comparisons.perception_study import (
     CAMOUFLAGE,
     SCENES,
@@ -21,7 +22,6 @@ from comparisons.perception_study import (
     Score,
     Seen,
     Strangers,
-    StudySpec,
     look,
     render_frames,
     score,
@@ -85,11 +85,12 @@ def see(spec: StudySpec, backends: Mapping[str, Backend], track: Track) -> Seen:
     latency: dict[str, tuple[float, ...]] = {}
     agreement = 1.0
     for condition, severity, data in _sets(spec, track):
+        told = data.as_described()
         for name, backend in backends.items():
             seen = look(backend, data.frames)
-            ledger.add(name, condition, severity, data, seen)
+            ledger.add(name, condition, severity, told, seen)
             if condition == VARIED:
-                ledger.groups += audit(name, data, seen)
+                ledger.groups += audit(name, told, seen)
                 ledger.strangers.append(stranger(name, "sphere", data, seen))
                 latency[name] = timed(backend, data.frames[:_TIMED])
         if condition == VARIED:

@@ -16,9 +16,10 @@ import numpy as np
 
 from comparisons.dynamic import random_episode
 from comparisons.eyes import Sight, truth_ahead
+from comparisons.intervals import bootstrapped, wilson
 from comparisons.learning import PairLearner
 from comparisons.outputs import Track
-from comparisons.perception_study import StudySpec, wilson
+from comparisons.perception_spec import StudySpec
 from comparisons.robot import Encounter, Moment, Robot, Run
 from hierarchy import checked, two_rooms
 from perception.corruptions import corrupt
@@ -31,8 +32,7 @@ from worlds.twin import Twin
 
 PRICED: Final = (("clean", 0), ("gaussian_noise", 4), ("occlusion", 4))
 """Conditions under which the episodes are played, and their severities."""
-_RESAMPLES: Final = 2000
-_BOOTSTRAP, _LENS = 20, 21  # name the streams of the resamples, and of the spoilt lens
+_LENS: Final = 21  # names the stream of the spoilt lens
 
 
 @dataclass(frozen=True)
@@ -283,19 +283,3 @@ def price(
         missed=looks["cube", "none"] + looks["sphere", "none"],
         imagined=looks["none", "cube"] + looks["none", "sphere"],
     )
-
-
-def bootstrapped(values: Sequence[float], seed: int) -> tuple[float, float]:
-    """Return the 95 % percentile bootstrap interval of a mean; (0, 0) of nothing.
-
-    Examples
-    --------
-    >>> bootstrapped([2.0, 2.0, 2.0], seed=1)
-    (2.0, 2.0)
-    """
-    if not values:
-        return 0.0, 0.0
-    drawn = Stream(seed, _BOOTSTRAP).uniforms(_RESAMPLES * len(values)).reshape(_RESAMPLES, len(values))
-    means = np.asarray(values)[(drawn * len(values)).astype(np.int64)].mean(axis=1)
-    low, high = np.quantile(means, (0.025, 0.975))
-    return float(low), float(high)

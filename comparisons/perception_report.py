@@ -9,12 +9,13 @@ from typing import Any, Final
 import numpy as np
 from matplotlib.figure import Figure
 
+from comparisons.perception_learning import Learning
+from comparisons.perception_learning_section import learning_results, learning_sections
 from comparisons.perception_price import Price
 from comparisons.perception_sections import (
     audit_section,
     confusions_section,
     corruptions_section,
-    interval,
     latency_section,
     mistakes_section,
     prices_section,
@@ -23,7 +24,9 @@ from comparisons.perception_sections import (
     score_of,
     strangers_section,
 )
-from comparisons.perception_study import VARIED, Seen, StudySpec
+from comparisons.perception_spec import StudySpec
+from comparisons.perception_study import VARIED, Seen
+from comparisons.perception_words import interval
 from comparisons.report import Report
 from comparisons.story_parts import percent
 from perception.calibration import Reliability
@@ -33,7 +36,9 @@ from perception.models import installed
 _PACKAGES: Final = ("affordant", "numpy", "opencv-python-headless", "pybullet", "scikit-learn", "torch")
 
 
-def tell_perception(spec: StudySpec, seen: Seen, prices: Sequence[Price]) -> tuple[Report, dict[str, Figure]]:
+def tell_perception(
+    spec: StudySpec, seen: Seen, prices: Sequence[Price], learning: Learning
+) -> tuple[Report, dict[str, Figure]]:
     """Return the report of a comparison, and the figures that it names."""
     parts = [
         scenes_section(seen),
@@ -41,6 +46,7 @@ def tell_perception(spec: StudySpec, seen: Seen, prices: Sequence[Price]) -> tup
         confusions_section(seen),
         reliability_section(seen),
         audit_section(seen),
+        *learning_sections(spec, learning),
         strangers_section(seen),
         latency_section(seen),
         *([prices_section(prices)] if prices else []),
@@ -55,14 +61,16 @@ def tell_perception(spec: StudySpec, seen: Seen, prices: Sequence[Price]) -> tup
     lead = (
         f"{len(seen.backends)} backends on the same {spec.frames} frames of every set, all of seed "
         f"{spec.seed}, which is kept for tests: the ready-made weights know none of them. The truth of a "
-        "frame is what the robot found out by pushing; that is what the scene holds on "
-        f"{percent(seen.agreement)} of the varied frames."
+        "frame is what its scene holds. Backends learn from what the robot finds out by pushing instead; on "
+        f"{percent(seen.agreement)} of the varied frames the two are the same."
     )
     sections = tuple(part.section for part in parts)
     return Report("Perception backends compared", tuple(summary), sections, lead=lead), figures
 
 
-def perception_results(spec: StudySpec, seen: Seen, prices: Sequence[Price]) -> dict[str, Any]:
+def perception_results(
+    spec: StudySpec, seen: Seen, prices: Sequence[Price], learning: Learning
+) -> dict[str, Any]:
     """Return the content of results.json: all but times, so that the same seed gives the same bytes."""
     return {
         "spec": asdict(spec) | {"backends": list(seen.backends)},
@@ -75,6 +83,7 @@ def perception_results(spec: StudySpec, seen: Seen, prices: Sequence[Price]) -> 
             for one in seen.scores
         ],
         "audit": [asdict(one) for one in seen.groups],
+        **learning_results(learning),
         "solids_never_learnt": [asdict(one) for one in seen.strangers],
         "reliability": {
             name: {"scenes": _bins(scenes), "corrupted": _bins(corrupted)}

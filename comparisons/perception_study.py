@@ -13,12 +13,12 @@ from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 
+from comparisons.intervals import wilson
 from comparisons.learnt import frame_backend
 from comparisons.outputs import Track
+from perception.audit import confusion_of
 from perception.calibration import Reliability, calibration_error
-from perception.data import split_of
 from perception.percepts import Percepts
 from perception.protocol import LABELS, NOTHING, Backend, Detection, Frame, FrameBackend, View
 from perception.pushed import PushedFrames, pushed_frames
@@ -45,44 +45,6 @@ CAMOUFLAGE: Final = "colour like the floor"
 UNKNOWN: Final = tuple(family for family in FAMILIES if family not in KINDS)
 """Families of solids that no backend has learnt."""
 _CHUNK: Final = 100  # frames rendered, or looked at, at once
-
-
-@dataclass(frozen=True)
-class StudySpec:
-    """What to compare.
-
-    Parameters
-    ----------
-    backends
-        Names; () takes every one that reads frames.
-    seed
-        Of the scenes: 200 or more, for those below train and tune.
-    frames
-        Of every set of scenes.
-    episodes
-        Random episodes in which mistakes are paid for.
-    severities
-        Of each corruption.
-
-    Raises
-    ------
-    UserError
-        If the seed is not for tests, or a number is not positive.
-    """
-
-    backends: tuple[str, ...] = ()
-    seed: int = 200
-    frames: int = 1000
-    episodes: int = 200
-    severities: tuple[int, ...] = (1, 2, 3, 4, 5)
-
-    def __post_init__(self) -> None:
-        if split_of(self.seed) != "test":
-            raise UserError(f"--seed {self.seed} names {split_of(self.seed)} frames; use 200 to 299")
-        if self.frames < len(LABELS):
-            raise UserError(f"--frames {self.frames}: give at least {len(LABELS)}, one of each label")
-        if self.episodes < 0:
-            raise UserError(f"--episodes {self.episodes}: give 0 or more")
 
 
 @dataclass(frozen=True)
@@ -210,20 +172,6 @@ class Seen:
     latency: Mapping[str, tuple[float, ...]]
 
 
-def wilson(right: int, frames: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a share; (0, 1) of nothing.
-
-    Examples
-    --------
-    >>> [round(bound, 4) for bound in wilson(98, 100)], wilson(0, 0)
-    ([0.93, 0.9945], (0.0, 1.0))
-    """
-    if not frames:
-        return 0.0, 1.0
-    bounds = binomtest(right, frames).proportion_ci(0.95, method="wilson")
-    return float(bounds.low), float(bounds.high)
-
-
 def load_backends(names: Sequence[str], camera: Camera) -> dict[str, Backend]:
     """Return backends by name; () loads every one that reads frames.
 
@@ -278,16 +226,14 @@ def _percepts(found: Sequence[Detection]) -> Percepts:
 
 
 def score(backend: str, condition: str, severity: int, data: PushedFrames, seen: Percepts) -> Score:
-    """Hold what a backend saw to what the robot found out by pushing."""
-    matrix = np.zeros((len(LABELS), len(LABELS)), dtype=np.int64)
-    np.add.at(matrix, (data.labels, seen.labels), 1)
+    """Hold what a backend saw to the labels and distances of frames."""
     right = data.labels == seen.labels
     found = right & (data.labels != LABELS.index("none"))
     return Score(
         backend,
         condition,
         severity,
-        tuple(tuple(int(n) for n in row) for row in matrix),
+        confusion_of(data.labels, seen.labels),
         float(calibration_error(seen.probabilities, data.labels)),
         abstained=int(seen.abstains.sum()),
         answered_right=int((right & ~seen.abstains).sum()),

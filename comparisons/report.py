@@ -7,15 +7,18 @@ from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Final
 
 import cv2
 import numpy as np
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup, escape
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from comparisons.style import Picture
+from comparisons.outputs import Track
+from comparisons.style import Picture, picture
 
 _NUMBER: Final = re.compile(r"[-+\N{MINUS SIGN}]?\d[\d,.]*( ?(%|s|ms))?( of \d+| ?/ ?\d+)?")
 _NOTHING: Final = "\N{EN DASH}"
@@ -154,6 +157,37 @@ def render(report: Report, pictures: Mapping[str, Picture]) -> str:
     return page.rstrip() + "\n"
 
 
+def write_report(report: Report, figures: Mapping[str, Figure], directory: Path, track: Track) -> None:
+    """Write a report into an existing folder: ``report.html``, and each figure as PNG and SVG in ``figures``.
+
+    Parameters
+    ----------
+    report
+        What to write.
+    figures
+        The figures that its sections name; each is drawn once.
+    directory
+        Where; it has no ``figures`` yet.
+    track
+        Shows progress.
+
+    Examples
+    --------
+    >>> from tempfile import TemporaryDirectory
+    >>> from comparisons.outputs import untracked
+    >>> with TemporaryDirectory() as folder:
+    ...     write_report(Report("Maze"), {"blank": Figure((1, 1))}, Path(folder), untracked)
+    ...     sorted(path.name for path in Path(folder).rglob("*.*"))
+    ['blank.png', 'blank.svg', 'report.html']
+    """
+    (directory / "figures").mkdir()
+    pictures = {}
+    for name in track(figures, total=len(figures), description="drawing figures"):
+        pictures[name] = picture(figures[name])
+        pictures[name].save(directory / "figures", name)
+    (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
+
+
 def _sections(sections: Sequence[Section], pictures: Mapping[str, Picture]) -> list[dict[str, Any]]:
     """Return what the template needs of each section; figures and tables are numbered throughout."""
     out: list[dict[str, Any]] = []
@@ -167,8 +201,8 @@ def _sections(sections: Sequence[Section], pictures: Mapping[str, Picture]) -> l
                     f"section {section.title!r} names the figure {name!r}, which is not given ({known})"
                 )
             figure_number += 1
-            picture = _picture(pictures[name], f"f{figure_number}", caption)
-            shown.append({"number": figure_number, "caption": caption, "picture": picture})
+            drawn = _picture(pictures[name], f"f{figure_number}", caption)
+            shown.append({"number": figure_number, "caption": caption, "picture": drawn})
         tables = []
         for table in section.tables:
             table_number += 1
@@ -213,11 +247,11 @@ def _cell(value: Value) -> dict[str, Any]:
             return {"text": text, "number": _NUMBER.fullmatch(text) is not None, "verdict": ""}
 
 
-def _picture(picture: Picture, prefix: str, caption: str) -> Markup:
+def _picture(drawn: Picture, prefix: str, caption: str) -> Markup:
     """Return a figure as inline SVG or as a PNG in an `img`, whichever is shorter."""
-    width = round(_PIXELS * picture.width)
-    svg = _inline_svg(picture.svg, prefix, caption, width)
-    png = Markup('<img alt="{}" width="{}" src="{}">').format(caption, width, _data_url(picture.png))
+    width = round(_PIXELS * drawn.width)
+    svg = _inline_svg(drawn.svg, prefix, caption, width)
+    png = Markup('<img alt="{}" width="{}" src="{}">').format(caption, width, _data_url(drawn.png))
     return min(svg, png, key=len)
 
 

@@ -9,10 +9,9 @@ from rich.console import Console
 
 from comparisons.experiment import Experiment, Spec
 from comparisons.outputs import new_directory, progress_on, refuse_existing, track_with, write_json
-from comparisons.report import render
+from comparisons.report import write_report
 from comparisons.results import find, results
 from comparisons.story import tell
-from comparisons.style import picture
 from hierarchy import mermaid
 
 
@@ -43,20 +42,16 @@ def reproduce(spec: Spec, out: Path, console: Console) -> dict[str, object]:
     """
     refuse_existing(out)
     progress = progress_on(console)
-    experiment = Experiment(spec, track_with(progress))
+    track = track_with(progress)
+    experiment = Experiment(spec, track)
     with new_directory(out) as directory, progress:
         begun = process_time()
         found = find(experiment)
         searched = process_time()
         content = results(spec, experiment.layout, experiment.grounded, found)
         report, figures = tell(experiment, found)
-        (directory / "figures").mkdir()
-        pictures = {}
-        for name in progress.track(figures, description="drawing figures"):
-            pictures[name] = picture(figures[name])
-            pictures[name].save(directory / "figures", name)
+        write_report(report, figures, directory, track)
         (directory / "task_graph.mmd").write_text(mermaid(experiment.grounded.graph), encoding="utf-8")
-        (directory / "report.html").write_text(render(report, pictures), encoding="utf-8")
         times = {"experiment": searched - begun, "report": process_time() - searched}
         write_json(directory / "results.json", content)
         write_json(directory / "times.json", times)

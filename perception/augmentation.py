@@ -7,6 +7,7 @@ disc, low contrast about the mean, grey, hue and JPEG.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Final
@@ -18,7 +19,12 @@ from torch.nn import functional
 from worlds import Stream
 
 _WEIGHTS: Final = (0.299, 0.587, 0.114)  # of red, green and blue in brightness (ITU-R BT.601)
-_KERNEL: Final = 9  # pixels; the longest blur
+_KERNEL: Final = 11  # pixels; the longest blur
+_SMALLEST: Final = 0.02  # of a frame's area: of patches the smallest
+_SLIMMEST: Final = 2.5  # the height of a patch as a share of its width, or the other way round
+
+Spoil = Callable[[Tensor, torch.Generator], Tensor]
+"""Takes frames, shape (frames, 3, rows, columns), and a generator; gives spoilt ones."""
 
 
 @dataclass(frozen=True)
@@ -36,11 +42,12 @@ class Augmentation:
     noisy, noise
         Share of frames with gaussian noise, and its largest standard deviation.
     blurred
-        Share of frames smeared along a line of up to 9 pixels.
+        Share of frames smeared along a line of up to 11 pixels.
     coarse
         Share of frames whose resolution is divided by 2 or 4.
     hidden, patch
-        Share of frames with a patch of one colour, and the patch's largest side as a share of the frame's.
+        Share of frames with a patch of one colour held before the lens, and the largest area of one, as a
+        share of the frame's.
     """
 
     darkest: float = 0.2
@@ -48,11 +55,11 @@ class Augmentation:
     tint: float = 0.25
     saturation: float = 0.7
     noisy: float = 0.4
-    noise: float = 0.15
+    noise: float = 0.18
     blurred: float = 0.3
-    coarse: float = 0.15
-    hidden: float = 0.6
-    patch: float = 0.6
+    coarse: float = 0.1
+    hidden: float = 0.75
+    patch: float = 0.25
 
 
 def generator(*key: int) -> torch.Generator:
@@ -89,19 +96,23 @@ def augment(frames: Tensor, settings: Augmentation, draw: torch.Generator) -> Te
     >>> augment(frames, Augmentation(), generator(1)).shape
     torch.Size([2, 3, 8, 8])
     """
+    hide = partial(_hide, most=settings.patch)
+    add_noise = partial(_add_noise, most=settings.noise)
+    # What is before the lens is in the same light as the rest, so it comes first; the sensor's noise last.
+    frames = _some(frames.clone(), ((0.5, _flip), (settings.hidden, hide)), draw)
     frames = _recolour(frames, settings, draw)
-    for share, spoil in (
-        (0.5, _flip),
-        (settings.hidden, partial(_hide, most=settings.patch)),
-        (settings.coarse, _coarsen),
-        (settings.blurred, _smear),
-        (settings.noisy, partial(_add_noise, most=settings.noise)),
-    ):
+    spoils = ((settings.coarse, _coarsen), (settings.blurred, _smear), (settings.noisy, add_noise))
+    return _some(frames, spoils, draw).clamp_(0.0, 1.0)
+
+
+def _some(frames: Tensor, spoils: Sequence[tuple[float, Spoil]], draw: torch.Generator) -> Tensor:
+    """Spoil a share of the frames in each way, in place."""
+    for share, spoil in spoils:
         chosen = (torch.rand(len(frames), generator=draw) < share).nonzero().flatten()
         if len(chosen):  # only these: spoiling all and choosing afterwards takes three times as long
             chosen = chosen.to(frames.device)
             frames[chosen] = spoil(frames[chosen], draw)
-    return frames.clamp_(0.0, 1.0)
+    return frames
 
 
 def _uniform(frames: Tensor, shape: tuple[int, ...], draw: torch.Generator) -> Tensor:
@@ -128,16 +139,16 @@ def _add_noise(frames: Tensor, draw: torch.Generator, *, most: float) -> Tensor:
 
 
 def _hide(frames: Tensor, draw: torch.Generator, *, most: float) -> Tensor:
-    """Put a rectangle of one colour over each frame, anywhere."""
-    rows, cols = frames.shape[2:]
+    """Hold a patch of one colour before each frame, anywhere, wholly in the picture."""
+    area = _SMALLEST + (most - _SMALLEST) * _uniform(frames, (1, 1, 1), draw)
+    aspect = _SLIMMEST ** (2 * _uniform(frames, (1, 1, 1), draw) - 1)
     inside = []
-    for across, count in ((2, rows), (3, cols)):
-        middle = _uniform(frames, (1, 1, 1), draw) * count
-        half = _uniform(frames, (1, 1, 1), draw) * most * count / 2
-        shape = [1, 1, 1, 1]
-        shape[across] = count
-        place = torch.arange(count, device=frames.device).view(shape) + 0.5
-        inside.append((place - middle).abs() < half)
+    for axis, side in ((2, (area * aspect).sqrt()), (3, (area / aspect).sqrt())):
+        start = (1 - side) * _uniform(frames, (1, 1, 1), draw)
+        count = frames.shape[axis]
+        place = (torch.arange(count, device=frames.device) + 0.5) / count
+        place = place.view([1, 1, 1, -1] if axis == 3 else [1, 1, -1, 1])
+        inside.append((place >= start) & (place < start + side))
     return torch.where(inside[0] & inside[1], _uniform(frames, (3, 1, 1), draw), frames)
 
 

@@ -7,25 +7,25 @@ robot pushes and learns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Final, Self
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from perception.calibration import softmax
-from perception.cnn import Cnn, ready_made, tuned
+from perception.cnn import Cnn
 from perception.hough import Hough
-from perception.models import Card, Tensors, load_model, save_model
+from perception.labelled import Labelled, held_out
+from perception.learnt import Learnt, tuned
+from perception.models import Card, Tensors
 from perception.network import SHAPES
-from perception.percepts import Percepts, Sees, checked_frames
+from perception.percepts import Percepts, checked_frames
 from perception.protocol import LABELS, Frames
-from perception.training import Labelled, Rows, Training, held_out
+from perception.training import Training
 from worlds.camera import Camera
 
-READY_MADE: Final = "weights/ensemble.safetensors"
 ACCEPTED: Final = 0.93
 """Share of the spheres of the tuning frames that the gate lets pass: more than the 0.9 wanted."""
 _LEAST: Final = 1e-9  # of a probability, so that it has a logarithm
@@ -33,7 +33,7 @@ _MAJORITY: Final = 0.5
 _SPHERE: Final = LABELS.index("sphere")
 
 
-class Ensemble(Sees):
+class Ensemble(Learnt):
     """CNN and Hough as one backend, which abstains where they do not agree.
 
     Its probabilities are the product of the two, which take each other for independent witnesses, tempered by
@@ -55,11 +55,17 @@ class Ensemble(Sees):
     """
 
     name = "ensemble"
+    shapes = SHAPES
+    packages = ("numpy", "opencv-python-headless", "torch")
 
     def __init__(self, camera: Camera | None = None, model: tuple[Tensors, Card] | None = None) -> None:
-        self.camera = Camera() if camera is None else camera
+        super().__init__(camera, model)
         self.hough = Hough(self.camera)
-        self._take(*(ready_made(READY_MADE, self.name, SHAPES) if model is None else model))
+
+    def scores(self, frames: Frames) -> NDArray[np.float64]:
+        """Return pooled scores of labels, then the network's of distances, shape (frames, 5)."""
+        learnt, built = self._both(frames)
+        return np.concatenate([pooled(learnt, built), self._cnn.scores(frames)[:, len(LABELS) :]], axis=1)
 
     def perceive(self, frames: Frames) -> Percepts:
         """Return what stands ahead in each frame, uint8, shape (frames, rows, columns, 3).
@@ -83,13 +89,14 @@ class Ensemble(Sees):
         *,
         tuning: Labelled | None = None,
         settings: Training | None = None,
+        effort: float = 1.0,
         about: str | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Self:
         """Train the network anew and set the gate; see `perception.cnn.Cnn.fit` for the parameters."""
-        learnt, kept = (Rows.of(data), tuning) if tuning is not None else held_out(data)
-        cnn = Cnn(self.camera, (self._tensors, replace(self.card, backend=Cnn.name)))
-        cnn.fit(learnt, seed, tuning=kept, settings=settings, about=about, progress=progress)
+        learnt, kept = (data, tuning) if tuning is not None else held_out(data)
+        cnn = Cnn(self.camera, (self.tensors, replace(self.card, backend=Cnn.name)))
+        cnn.fit(learnt, seed, tuning=kept, settings=settings, effort=effort, about=about, progress=progress)
         return self.gate(cnn, kept)
 
     def gate(self, cnn: Cnn, kept: Labelled, accepted: float = ACCEPTED) -> Self:
@@ -113,37 +120,21 @@ class Ensemble(Sees):
         plain = replace(card, backend=self.name, temperature=1.0, threshold=0.0)
         self._take(tensors, plain)
         learnt, built = self._both(kept.frames)
-        card = tuned(plain, pooled(learnt, built), kept.labels, ("numpy", "opencv-python-headless", "torch"))
+        card = tuned(plain, pooled(learnt, built), kept.labels, self.packages)
         agreed = agreement(learnt, built, np.full(len(learnt), _SPHERE))[kept.labels == _SPHERE]
         threshold = float(np.quantile(agreed, 1 - accepted, method="lower")) if len(agreed) else 1.0
         self._take(tensors, replace(card, threshold=threshold))
         return self
 
-    def save(self, path: Path | str) -> None:
-        """Write the network's weights, with the ensemble's card beside them."""
-        save_model(path, self._tensors, self.card)
-
-    @classmethod
-    def load(cls, path: Path | str, camera: Camera | None = None) -> Self:
-        """Return the backend that `save` wrote.
-
-        Raises
-        ------
-        UserError
-            If there is no such file, or it is broken or of another kind.
-        """
-        return cls(camera, load_model(path, cls.name, SHAPES))
-
     def _both(self, frames: Frames) -> tuple[Percepts, Percepts]:
         frames = checked_frames(frames, self.camera.pixels)
         return self._cnn.perceive(frames), self.hough.perceive(frames)
 
-    def _take(self, tensors: Tensors, card: Card) -> None:
-        self.card, self._tensors = card, tensors
+    def _take(self, tensors: Mapping[str, NDArray[Any]], card: Card) -> None:
+        super()._take(tensors, card)
         # The network's own temperature is in its last layer by now (`Cnn.tempered`).
-        self._cnn = Cnn(
-            self.camera, (tensors, replace(card, backend=Cnn.name, temperature=1.0, threshold=0.0))
-        )
+        its = replace(card, backend=Cnn.name, temperature=1.0, threshold=0.0)
+        self._cnn = Cnn(self.camera, (self.tensors, its))
 
 
 def pooled(one: Percepts, other: Percepts) -> NDArray[np.float64]:

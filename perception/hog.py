@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final, Self
 
 import numpy as np
@@ -16,28 +15,25 @@ from numpy.typing import NDArray
 from skimage.feature import hog
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import LogisticRegression
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped, unused-ignore]  # no types
 
-from perception.calibration import softmax
-from perception.cnn import ready_made, tuned
-from perception.models import Card, Tensors, load_model, save_model
-from perception.percepts import Percepts, Sees, checked_frames
+from perception.labelled import PIXELS, Labelled, Rows, resized
+from perception.learnt import SCORES, Learnt, checked_effort
+from perception.models import Tensors
+from perception.percepts import checked_frames
 from perception.protocol import LABELS, REACH, Frames
-from perception.training import Labelled, Rows, held_out, resized
-from worlds.camera import Camera
 
-PIXELS: Final = 64
-"""Width and height of what it looks at; frames of other sizes are resized."""
 _ORIENTATIONS: Final = 9
 _CELL: Final = 8  # pixels
 _BLOCK: Final = 2  # cells
 FEATURES: Final = (PIXELS // _CELL - _BLOCK + 1) ** 2 * _BLOCK**2 * _ORIENTATIONS
 """Numbers a frame."""
-SHAPES: Final = {"factors": (len(LABELS) + REACH, FEATURES), "constants": (len(LABELS) + REACH,)}
-READY_MADE: Final = "weights/hog.safetensors"
+SHAPES: Final = {"factors": (SCORES, FEATURES), "constants": (SCORES,)}
+"""What is learnt: factors of the features, and constants, of every score."""
 _STRENGTH: Final = 0.1  # inverse of the penalty on large factors
 
 
-class Hog(Sees):
+class Hog(Learnt):
     """A linear classifier on HOG features as a backend.
 
     Parameters
@@ -55,25 +51,14 @@ class Hog(Sees):
     """
 
     name = "hog"
-
-    def __init__(self, camera: Camera | None = None, model: tuple[Tensors, Card] | None = None) -> None:
-        self.camera = Camera() if camera is None else camera
-        self._take(*(ready_made(READY_MADE, self.name, SHAPES) if model is None else model))
-
-    def perceive(self, frames: Frames) -> Percepts:
-        """Return what stands ahead in each frame, uint8, shape (frames, rows, columns, 3)."""
-        found = self.scores(frames)
-        probabilities = softmax(found[:, : len(LABELS)], self.card.temperature)
-        return Percepts(
-            probabilities,
-            found[:, len(LABELS) :].argmax(axis=1).astype(np.int64) + 1,
-            probabilities.max(axis=1) < self.card.threshold,
-        )
+    shapes = SHAPES
+    packages = ("numpy", "scikit-image", "scikit-learn")
 
     def scores(self, frames: Frames) -> NDArray[np.float64]:
         """Return scores of labels, then of distances, shape (frames, 5)."""
+        factors, constants = self.tensors["factors"], self.tensors["constants"]
         # Frame by frame: sums over a batch may be ordered otherwise, and end in other bits.
-        return np.stack([self._factors @ row + self._constants for row in features(frames)])
+        return np.stack([factors @ row + constants for row in features(frames)])
 
     def fit(
         self,
@@ -81,70 +66,24 @@ class Hog(Sees):
         seed: int,
         *,
         tuning: Labelled | None = None,
+        effort: float = 1.0,
         about: str | None = None,
         progress: Callable[[float], None] | None = None,
     ) -> Self:
-        """Learn anew, and forget what was known.
+        """Learn anew, and forget what was known; see `perception.learnt.Learnt.fit` for what is not here.
 
         Parameters
         ----------
-        data
-            What to learn from.
         seed
             Goes onto the card; nothing is drawn, for the best linear classifier is one.
-        tuning
-            Frames to set the temperature by. Defaults to every tenth of `data`, not learnt from then.
-        about
-            What the card says of the data. Defaults to the number of frames.
-        progress
-            Called with the share of the work that is done.
-
-        Returns
-        -------
-        Self
-            This backend.
-
-        Raises
-        ------
-        UserError
-            If the data are no frames with labels and distances.
+        effort
+            Checked, and then ignored: the search for the best classifier ends by itself.
         """
-        learnt, kept = (Rows.of(data), tuning) if tuning is not None else held_out(data)
-        seen = features(learnt.frames)
-        there = learnt.labels > 0
-        heads = (
-            _fitted(seen, learnt.labels, len(LABELS)),
-            _fitted(seen[there], learnt.distances[there] - 1, REACH),
-        )
-        factors, constants = (np.concatenate(part) for part in zip(*heads, strict=True))
-        model = {"factors": factors.astype(np.float32), "constants": constants.astype(np.float32)}
-        plain = Card(self.name, about or f"{len(learnt.frames)} frames", seed)
-        self._take(model, plain)
-        found = self.scores(kept.frames)[:, : len(LABELS)]
-        self._take(model, tuned(plain, found, kept.labels, ("numpy", "scikit-image", "scikit-learn")))
+        checked_effort(effort)
+        self._fitted(data, seed, tuning, about, _learnt)
         if progress is not None:
             progress(1.0)
         return self
-
-    def save(self, path: Path | str) -> None:
-        """Write factors and constants, with their card beside them; see `perception.models.save_model`."""
-        save_model(path, {"factors": self._factors, "constants": self._constants}, self.card)
-
-    @classmethod
-    def load(cls, path: Path | str, camera: Camera | None = None) -> Self:
-        """Return the backend that `save` wrote.
-
-        Raises
-        ------
-        UserError
-            If there is no such file, or it is broken or of another kind.
-        """
-        return cls(camera, load_model(path, cls.name, SHAPES))
-
-    def _take(self, tensors: Tensors, card: Card) -> None:
-        self.card = card
-        self._factors = np.array(tensors["factors"], dtype=np.float32)
-        self._constants = np.array(tensors["constants"], dtype=np.float32)
 
 
 def features(frames: Frames) -> NDArray[np.float32]:
@@ -157,7 +96,7 @@ def features(frames: Frames) -> NDArray[np.float32]:
     >>> features(np.zeros((1, 96, 96, 3), np.uint8)).shape
     (1, 1764)
     """
-    small = resized(checked_frames(frames), PIXELS)
+    small = resized(checked_frames(frames))
     found: NDArray[np.float32] = np.empty((len(small), FEATURES), np.float32)
     for row, frame in zip(found, small, strict=True):
         row[:] = hog(
@@ -171,7 +110,20 @@ def features(frames: Frames) -> NDArray[np.float32]:
     return found
 
 
-def _fitted(seen: NDArray[Any], labels: NDArray[np.int64], classes: int) -> tuple[NDArray[Any], NDArray[Any]]:
+def _learnt(data: Rows) -> Tensors:
+    """Return the factors and constants of the labels' classifier and, below, the distances'."""
+    seen, there = features(data.frames), data.labels > 0
+    heads = (
+        _classifier(seen, data.labels, len(LABELS)),
+        _classifier(seen[there], data.distances[there] - 1, REACH),
+    )
+    factors, constants = (np.concatenate(part) for part in zip(*heads, strict=True))
+    return {"factors": factors, "constants": constants}
+
+
+def _classifier(
+    seen: NDArray[Any], labels: NDArray[np.int64], classes: int
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """Return factors and constants of `classes` scores; a class that the data lack scores lowest."""
     factors, constants = np.zeros((classes, FEATURES)), np.full(classes, -30.0)
     present = np.unique(labels)
@@ -179,7 +131,8 @@ def _fitted(seen: NDArray[Any], labels: NDArray[np.int64], classes: int) -> tupl
         constants[present] = 0.0
         return factors, constants
     found = LogisticRegression(C=_STRENGTH, max_iter=300, tol=1e-3)
-    with warnings.catch_warnings():
+    # One thread: the order of sums, and so their last bits, then stay the same.
+    with threadpool_limits(1), warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # close to the best is good enough here
         found.fit(seen, labels)
     if len(present) == 2:  # scikit-learn then keeps one row, the second class's lead over the first

@@ -26,8 +26,8 @@ from perception.weighing import Weights, weigh
 from worlds.camera import Camera
 
 WEIGHTS: Final[Weights] = (
-    ((-13.587, 23.598, 2.908, 0.0, 0.0, -0.232), (-11.915, -3.793, 0.0, 20.389, 5.653, 0.877)),
-    ((-12.692, 21.18, 0.644, 0.0, 0.0, 0.161), (-6.973, -4.587, -0.768, 16.691, 0.0, 0.037)),
+    ((-13.56, 23.53, 2.93, 0.0, 0.0, -0.23), (-11.89, -4.0, 0.0, 20.43, 5.74, 0.9)),
+    ((-12.69, 21.17, 0.64, 0.0, 0.0, 0.16), (-6.97, -4.58, -0.78, 16.69, 0.0, 0.04)),
 )
 """Fitted by `perception.tuning` to 1,500 frames of the twin, as they are and corrupted."""
 

@@ -15,25 +15,22 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
 
-from perception.protocol import LABELS, REACH
+from perception.labelled import PIXELS
+from perception.learnt import SCORES
 
-PIXELS: Final = 64
-"""Width and height of what the network looks at; frames of other sizes are resized."""
 CONVOLUTIONS: Final = ((3, 16, 2), (16, 32, 2), (32, 64, 2), (64, 64, 1))
 """Channels in, channels out and stride of each; all are 3 x 3."""
 _HIDDEN: Final = 32
 _FAINT: Final = 1e-4  # of the range of colours: less than this is no picture
 _PLACES: Final = (PIXELS // 16) ** 2  # of the map that the heads see
-HEADS: Final = len(LABELS) + REACH
-"""Scores a frame: of each label, then of each distance."""
 
 SHAPES: Final[Mapping[str, tuple[int, ...]]] = {
     **{f"conv{i}.weight": (out, into, 3, 3) for i, (into, out, _) in enumerate(CONVOLUTIONS)},
     **{f"conv{i}.bias": (out,) for i, (_, out, _) in enumerate(CONVOLUTIONS)},
     "hidden.weight": (_HIDDEN, CONVOLUTIONS[-1][1] * _PLACES),
     "hidden.bias": (_HIDDEN,),
-    "heads.weight": (HEADS, _HIDDEN),
-    "heads.bias": (HEADS,),
+    "heads.weight": (SCORES, _HIDDEN),
+    "heads.bias": (SCORES,),
 }
 """The folded network's tensors."""
 
@@ -54,7 +51,7 @@ class Network(nn.Module):
     True
     """
 
-    def __init__(self, dropout: float = 0.2) -> None:
+    def __init__(self, dropout: float = 0.05) -> None:
         super().__init__()
         self.convs = nn.ModuleList(
             nn.Conv2d(into, out, 3, stride, 1, bias=False) for into, out, stride in CONVOLUTIONS
@@ -62,7 +59,7 @@ class Network(nn.Module):
         self.norms = nn.ModuleList(nn.BatchNorm2d(out) for _, out, _ in CONVOLUTIONS)
         self.dropout = nn.Dropout(dropout)
         self.hidden = nn.Linear(CONVOLUTIONS[-1][1] * _PLACES, _HIDDEN)
-        self.heads = nn.Linear(_HIDDEN, HEADS)
+        self.heads = nn.Linear(_HIDDEN, SCORES)
 
     def forward(self, frames: Tensor) -> Tensor:
         """Return scores, shape (frames, 5), of frames with colours from 0 to 1, shape (frames, 3, 64, 64)."""

@@ -114,6 +114,11 @@ class PushedFrames:
         """Share of the frames whose own label is the scene's, in [0, 1]; 1 of none."""
         return float((self.labels == self.truth).mean()) if len(self) else 1.0
 
+    def as_described(self) -> Self:
+        """Return the same frames with the scene's labels and distances: to measure by, not to learn from."""
+        columns = {field.name: getattr(self, field.name) for field in fields(self)}
+        return type(self)(**{**columns, "labels": self.truth, "distances": self.true_distances})
+
     def mislabelled(self, share: float, seed: int) -> Self:
         """Return the same frames with a share of the labels wrong, each made one of the other two.
 

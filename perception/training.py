@@ -8,61 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from typing import Any, Final, Protocol
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Self
 
-import cv2
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
 from perception.augmentation import Augmentation, augment, generator
-from perception.network import PIXELS, Network
-from perception.percepts import checked_frames
-from perception.protocol import LABELS, REACH, Frames
+from perception.labelled import Labelled, checked_data, resized
+from perception.learnt import checked_effort
+from perception.network import Network
+from perception.protocol import LABELS, REACH
 from worlds import UserError
 
-_EVERY: Final = 10  # frames, of which one is kept for tuning
 _LEAST_UPDATES: Final = 10
 _INIT, _ORDER, _SPOIL, _DROP = range(4)  # what a stream of the seed is for
-
-
-class Labelled(Protocol):
-    """Frames and what stands ahead in each, such as `perception.data.PushedFrames`.
-
-    `frames` are uint8, shape (frames, rows, columns, 3); `labels` places in `LABELS`, and `distances` cells
-    from 1 to `REACH`, of which those of frames with nothing ahead are not read; both shape (frames,).
-    """
-
-    @property
-    def frames(self) -> Frames:
-        """The frames."""
-        ...
-
-    @property
-    def labels(self) -> NDArray[np.int64]:
-        """The label of each, by its place in `LABELS`."""
-        ...
-
-    @property
-    def distances(self) -> NDArray[np.int64]:
-        """The obstacle's distance in each, in cells."""
-        ...
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """Some rows of labelled data; see `Labelled` for the fields."""
-
-    frames: Frames
-    labels: NDArray[np.int64]
-    distances: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, data: Labelled, rows: NDArray[np.int64] | slice = slice(None)) -> Rows:
-        """Return some rows of data."""
-        return cls(data.frames[rows], data.labels[rows], data.distances[rows])
 
 
 @dataclass(frozen=True)
@@ -79,8 +41,6 @@ class Training:
         The learning rate's top.
     decay
         Weight decay.
-    smoothing
-        Share of each label that is spread over all.
     distance
         Weight of the distance's loss beside the label's.
     augmentation
@@ -92,11 +52,10 @@ class Training:
         If there are too few updates, or no frames in a batch.
     """
 
-    updates: int = 3400
-    batch: int = 64
+    updates: int = 6800
+    batch: int = 32
     rate: float = 3e-3
     decay: float = 0.02
-    smoothing: float = 0.02
     distance: float = 0.2
     augmentation: Augmentation = field(default_factory=Augmentation)
 
@@ -106,6 +65,22 @@ class Training:
                 f"training takes at least {_LEAST_UPDATES} updates of at least 2 frames, "
                 f"not {self.updates} of {self.batch}"
             )
+
+    def scaled(self, effort: float) -> Self:
+        """Return the same with `effort` times as many updates, at least 10.
+
+        Raises
+        ------
+        UserError
+            If the effort is not above 0 and at most 10.
+
+        Examples
+        --------
+        >>> [Training(updates=400).scaled(effort).updates for effort in (0.5, 0.001, 2)]
+        [200, 10, 800]
+        """
+        updates = max(round(checked_effort(effort) * self.updates), _LEAST_UPDATES)
+        return replace(self, updates=updates)
 
 
 def train(
@@ -164,64 +139,6 @@ def train(
         return network.folded()
 
 
-def resized(frames: Frames, pixels: int = PIXELS) -> Frames:
-    """Return frames of `pixels` rows and columns, by the mean of the areas that fall together.
-
-    Examples
-    --------
-    >>> resized(np.zeros((2, 96, 96, 3), np.uint8)).shape
-    (2, 64, 64, 3)
-    """
-    if frames.shape[1:3] == (pixels, pixels):
-        return frames
-    shrinks = min(frames.shape[1:3]) >= pixels
-    way = cv2.INTER_AREA if shrinks else cv2.INTER_LINEAR
-    small = np.empty((len(frames), pixels, pixels, 3), np.uint8)
-    for frame, out in zip(frames, small, strict=True):
-        cv2.resize(np.ascontiguousarray(frame), (pixels, pixels), dst=out, interpolation=way)
-    return small
-
-
-def checked_data(data: Labelled) -> None:
-    """Refuse data that are no frames with a label and a distance each.
-
-    Raises
-    ------
-    UserError
-        If they are not; the message says what came and what is wanted.
-    """
-    count = len(checked_frames(data.frames))
-    labels, distances = np.asarray(data.labels), np.asarray(data.distances)
-    if labels.shape != (count,) or distances.shape != (count,):
-        raise UserError(
-            f"{count} frames need as many labels and distances, not {labels.shape} and {distances.shape}"
-        )
-    if labels.min() < 0 or labels.max() >= len(LABELS):
-        raise UserError(
-            f"labels are 0 to {len(LABELS) - 1} ({', '.join(LABELS)}), not {labels.min()} to {labels.max()}"
-        )
-    far = distances[labels > 0]
-    if len(far) and (far.min() < 1 or far.max() > REACH):
-        raise UserError(f"distances of obstacles are 1 to {REACH} cells, not {far.min()} to {far.max()}")
-
-
-def held_out(data: Labelled) -> tuple[Rows, Rows]:
-    """Return data to learn from, and every tenth frame to tune on; all for both where there are fewer.
-
-    Examples
-    --------
-    >>> data = Rows(np.zeros((20, 8, 8, 3), np.uint8), np.zeros(20, np.int64), np.ones(20, np.int64))
-    >>> [len(part.frames) for part in held_out(data)]
-    [18, 2]
-    """
-    checked_data(data)
-    numbers = np.arange(len(data.frames))
-    kept = numbers % _EVERY == _EVERY - 1
-    if not kept.any():
-        return Rows.of(data), Rows.of(data)
-    return Rows.of(data, numbers[~kept]), Rows.of(data, numbers[kept])
-
-
 @contextmanager
 def one_thread() -> Iterator[None]:
     """Let torch use one thread meanwhile: the order of sums, and so their last bits, then stay the same."""
@@ -258,7 +175,7 @@ def _loss(
     found: torch.Tensor, labels: torch.Tensor, distances: torch.Tensor, settings: Training
 ) -> torch.Tensor:
     kinds, cells = found[:, : len(LABELS)], found[:, len(LABELS) :]
-    loss = functional.cross_entropy(kinds, labels, label_smoothing=settings.smoothing)
+    loss = functional.cross_entropy(kinds, labels)
     there = (labels > 0).to(found.dtype)
     far = functional.cross_entropy(cells, distances, reduction="none")
     return loss + settings.distance * (far * there).sum() / there.sum().clamp(min=1)

@@ -85,9 +85,10 @@ def fit_weights(
             jac=True,
             method="L-BFGS-B",
             bounds=_bounds(),
-            options={"maxiter": 2000},
+            options={"maxiter": 20_000, "maxfun": 100_000, "ftol": 0.0, "gtol": 1e-8},
         )
-        cube, sphere = best.x.round(3).reshape(2, -1).tolist()
+        # The maximum is one, and found closely enough for two digits to be the same on any machine.
+        cube, sphere = (best.x.round(2) + 0.0).reshape(2, -1).tolist()
         found.append((tuple(cube), tuple(sphere)))
     return tuple(found)
 

@@ -9,21 +9,22 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from shortcuts import as_package, render_painted
 
-from comparisons import learnt
+from comparisons import learnt, perception_learning
 from comparisons.cli import main
+from comparisons.intervals import bootstrapped, wilson
 from comparisons.outputs import untracked
 from comparisons.perception_looks import audit, see, stranger
-from comparisons.perception_price import Played, Spoilt, Task, bootstrapped, price
+from comparisons.perception_price import Played, Spoilt, Task, price
+from comparisons.perception_spec import StudySpec
 from comparisons.perception_study import (
     CAMOUFLAGE,
     SCENES,
     UNKNOWN,
-    StudySpec,
     load_backends,
     look,
     score,
-    wilson,
 )
 from perception.corruptions import CORRUPTIONS
 from perception.percepts import Percepts, Sees, checked_frames
@@ -220,13 +221,19 @@ def test_mistakes_have_a_price() -> None:
 @pytest.mark.slow
 @pytest.mark.usefixtures("fakes")
 def test_the_command_leaves_a_report_that_needs_no_network(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Report, results and figures, whole; the results repeat byte for byte."""
-    small = ("--frames", "6", "--episodes", "2", "--quick", "--backends", "always-cube", "always-none")
-    for name in ("one", "two"):
+    """Report, results and figures, whole; the results repeat byte for byte, however many workers train."""
+    (tmp_path / "package").mkdir()
+    as_package(tmp_path / "package", monkeypatch)
+    monkeypatch.setattr(perception_learning, "render_frames", render_painted)
+    small = ("--frames", "6", "--episodes", "2", "--quick")
+    backends = ("--backends", "always-cube", "always-none", "by-colour")
+    for name, workers in (("one", "1"), ("two", "2")):
         with pytest.raises(SystemExit) as ended:
-            main(["compare-perception", "--out", str(tmp_path / name), *small])
+            main(
+                ["compare-perception", "--out", str(tmp_path / name), "--workers", workers, *small, *backends]
+            )
         assert ended.value.code == 0
     assert "always-cube: right on" in capsys.readouterr().out
     entries = sorted(path.name for path in (tmp_path / "one").iterdir())
@@ -235,15 +242,26 @@ def test_the_command_leaves_a_report_that_needs_no_network(
     assert {a for a in re.findall(r"https?://[^\s\"'<>)]+", page) if "w3.org" not in a} == set()
     for title in ("Scenes", "Corruptions", "Confusion", "Reliability", "Short cuts", "Solids never learnt"):
         assert f">{title}</h2>" in page
-    for title in ("Latency", "The price of mistakes", "Mistakes"):
+    for title in ("Pushes needed", "Kept out of training", "Latency", "The price of mistakes", "Mistakes"):
         assert f">{title}</h2>" in page
     figures = {path.name for path in (tmp_path / "one" / "figures").iterdir()}
     names = {name.rsplit(".", 1)[0] for name in figures}
-    assert names >= {"scenes", "corruptions", "reliability", "confusion_1", "mistakes_2"}
+    assert names >= {
+        "scenes",
+        "corruptions",
+        "reliability",
+        "confusion_1",
+        "mistakes_2",
+        "pushes_needed",
+        "held_out",
+    }
     assert figures == {f"{name}.{kind}" for name in names for kind in ("png", "svg")}
     one, two = ((tmp_path / name / "results.json").read_bytes() for name in ("one", "two"))
     assert one == two
     content = json.loads(one)
     first = content["scores"][0]
     assert first["interval"][0] <= first["accuracy"] <= first["interval"][1]
-    assert {row["backend"] for row in content["price"]} == {"truth", "always-cube", "always-none"}
+    assert {row["backend"] for row in content["price"]} == {"truth", *backends[1:]}
+    assert content["spec"]["learning"]["effort"] == 0.02
+    for rows in (content["learning"], content["held_out"]):
+        assert {row["backend"] for row in rows} == {"by-colour"}

@@ -285,6 +285,15 @@ def test_wrong_labels_are_as_many_as_asked(data: PushedFrames, share: float) -> 
         assert not np.array_equal(wrong.labels, data.mislabelled(share, 2).labels)
 
 
+def test_described_frames_are_labelled_by_the_scene(data: PushedFrames) -> None:
+    """Whatever the pushes said, labels and distances are then what stands there."""
+    described = data.mislabelled(0.5, 1).as_described()
+    assert described.agreement == 1.0
+    assert [LABELS[label] for label in described.labels.tolist()] == data.kinds.tolist()
+    assert np.array_equal(described.distances, data.true_distances)
+    assert np.array_equal(described.pushes, data.pushes)
+
+
 def test_a_share_beyond_all_is_refused(data: PushedFrames) -> None:
     """More wrong labels than labels cannot be."""
     with pytest.raises(UserError, match="from 0 to 1"):

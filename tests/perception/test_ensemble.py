@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from perception.calibration import softmax
 from perception.cnn import Cnn
 from perception.ensemble import Ensemble, agreement, pooled
+from perception.labelled import Rows
 from perception.percepts import Percepts
 from perception.pushed import PushedFrames, pushed_frames
-from perception.training import Rows, Training
+from perception.training import Training
 from perception.variation import Variation
 from worlds import UserError
 from worlds.bullet import UNKNOWN_FORMS

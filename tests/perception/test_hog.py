@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from perception.hog import FEATURES, SHAPES, Hog, features
+from perception.labelled import Rows
 from perception.models import load_model
 from perception.pushed import PushedFrames, pushed_frames
-from perception.training import Rows
 from perception.variation import CLEAN
 from worlds import UserError
 
