@@ -191,7 +191,7 @@ def check(graph: str, /, *, world: str | None = None, gamma: float = 1.0) -> int
     Parameters
     ----------
     graph
-        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg).
+        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg, four_rooms).
     world
         World to check it on: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one
         that the graph names.
@@ -212,7 +212,7 @@ def draw(graph: str, /, *, world: str | None = None, out: Path = Path()) -> int:
     Parameters
     ----------
     graph
-        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg).
+        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg, four_rooms).
     world
         World that it is for: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one
         that the graph names.
@@ -267,6 +267,67 @@ def maze(
     numbers = {"doors": doors, "triggers": triggers, "goals": goals, "obstacles": obstacles}
     print(draw_maze(out, rows, cols, seed, rooms=rooms, **numbers), end="")
     return 0
+
+
+@app.command
+def learn(
+    graph: str,
+    /,
+    *,
+    out: Path,
+    learner: str = "option-critic",
+    world: str | None = None,
+    seed: int = 0,
+    config: Path | None = None,
+    terminations: str | None = None,
+    settings: Annotated[
+        tuple[str, ...], Parameter(name="--set", consume_multiple=True, negative_iterable=())
+    ] = (),
+    steps: int | None = None,
+    tolerance: float = 0.0,
+    resume: bool = False,
+) -> int:
+    """Learn a task graph on its world, held to the oracle, until every start's return is the best possible.
+
+    Exit status 0 says that it came so far, 1 that its steps were done before, 2 that nothing was learnt.
+    Ctrl-C and SIGTERM save what was learnt (130, 143), and --resume goes on as if nothing had happened.
+
+    Parameters
+    ----------
+    graph
+        A YAML file, or the name of a graph that comes with the package (two_rooms, taxi, hdg, four_rooms).
+    out
+        Directory to make, for checkpoint.safetensors, its card as JSON, and the learning curve, curve.csv.
+    learner
+        Learner: option-critic, maxq-0, flat-q, or one that an installed package adds.
+    world
+        World to learn on: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one that
+        the graph names.
+    seed
+        Of learning: the same seed and settings give the same curve and checkpoint on one machine.
+    config
+        YAML file of the option-critic's settings, those that differ from option_critic.yaml.
+    terminations
+        What ends a task: given (the graph), learnt, or prior (learnt, with the graph as a prior).
+    settings
+        Single settings as NAME=VALUE, such as --set rate=1e-3 gamma=0.95; they count more than the file.
+    steps
+        Environment steps to learn for. Defaults to the setting total, 1000000.
+    tolerance
+        Learning also ends when it ends from every start and the mean return is so near the best possible,
+        for worlds with chance, where learning cannot be exact.
+    resume
+        Go on from the checkpoint in the directory; give the rest of the command as before. Only --steps
+        and --tolerance may change.
+    """
+    from comparisons.learn_command import Spec, named_settings
+    from comparisons.learn_command import learn as run
+
+    named = named_settings(settings, terminations)
+    spec = Spec(graph, out, learner, world, seed, config, named, steps, tolerance, resume)
+    outcome = run(spec, Console(stderr=True))
+    print(outcome.text)
+    return 0 if outcome.reached else 1
 
 
 def main(tokens: Sequence[str] | None = None) -> None:

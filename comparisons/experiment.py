@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Final, TypeVar
+from typing import TYPE_CHECKING, Final, TypeVar
 
 from comparisons.dynamic import Tally, judge, random_episode
 from comparisons.eyes import Sight
@@ -21,6 +21,9 @@ from planners import Gap, LocalRule, Replanner, Replanning, gap, recursive_optim
 from worlds import Episode, Layout, Outcome, load_layout, maze_model
 from worlds.camera import Camera
 from worlds.twin import Twin
+
+if TYPE_CHECKING:
+    from comparisons.neural import Neural
 
 T = TypeVar("T")
 
@@ -227,6 +230,16 @@ class Experiment:
             local = LocalRule(self.layout, self.learners[pair[0], pair[1]].learner)
             outcomes[Robot(self.layout, self.grounded, local, sight).run(episode).outcome] += 1
         return outcomes
+
+    def neural(self, tally: Tally) -> Neural | None:
+        """Let an option-critic learn the same graph, and ask it for the same affordances; not if quick."""
+        if self.spec.quick:
+            return None
+        # TorchRL takes longer to load than a quick run takes.
+        from comparisons.neural import ask_neural, learn_neural  # noqa: PLC0415
+
+        learner = learn_neural(self.grounded, self.spec.seed, self.track)
+        return ask_neural(self.layout, self.oracle, learner, tally.verdicts)
 
     def _dynamic(self, sight: Sight) -> Tally:
         tally = Tally()

@@ -87,11 +87,12 @@ def held_out_section(spec: StudySpec, found: Learning) -> Part:
         }
         for name, groups in found.held_out.items()
     }
+    left = [one.learnt_from for groups in found.held_out.values() for one in groups]
     rows: list[tuple[Value, ...]] = []
     for alike in zip(*found.held_out.values(), strict=True):  # one group, a backend each
         for name, one in zip(found.held_out, alike, strict=True):
             first = name == found.backends[0]
-            which = (unbroken(one.group), one.learnt_from, one.frames) if first else ("", "", "")
+            which = (unbroken(one.group), one.frames) if first else ("", "")
             rights = (share(one.reference_right, one.frames), share(one.right, one.frames))
             errors = ", ".join(map(str, one.errors))
             rows.append((*which, name, *rights, _difference(one), errors))
@@ -99,15 +100,16 @@ def held_out_section(spec: StudySpec, found: Learning) -> Part:
         "A backend that goes by colour, scale or place fails on a group that it never met. Each group of "
         f"obstacles is kept out of the {most} pushes of seed 0 in turn, and the backend trained on the rest "
         "is held to the one trained on all of them, for as many steps, on the test frames of that group. "
-        "Things beside the way may still have the colour. " + _effort(spec.learning.effort)
+        f"That leaves {min(left)} to {max(left)} pushes; things beside the way may still have the colour. "
+        f"{_effort(spec.learning.effort)}"
     )
     caption = "Right labels on a group, learnt with it and without it; bars are Wilson's 95 % intervals."
-    header = ("kept out", "pushes left", "frames", "backend", "met", "kept out", "difference, points")
+    header = ("kept out", "frames", "backend", "met", "kept out", "difference, points")
     table = Table(
         "Right labels on each group, met in training and kept out of it; the difference, on the same "
         "frames, with Newcombe's 95 % interval for pairs; and how many frames of the group a backend that "
         "had not met it wrongly took for none, for a cube and for a sphere.",
-        (*header, "as none, cube, sphere"),
+        (*header, "taken for"),
         tuple(rows),
     )
     section = Section("Kept out of training", (text,), (("held_out", caption),), (table,))
@@ -157,6 +159,8 @@ def _labels(wrong: float) -> str:
 
 
 def _effort(effort: float) -> str:
-    return (
-        f"Every training takes {100 * effort:g} % of the usual number of steps, where a backend counts them."
+    steps = (
+        f"Every training takes {100 * effort:g} % of the usual number of steps, where a backend counts them"
     )
+    short = ": what is wrong after it may be for want of steps, and is not all for want of pushes"
+    return f"{steps}{short if effort < 1 else ''}."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from importlib.metadata import requires, version
 from platform import python_version
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from packaging.requirements import Requirement
 
@@ -20,6 +20,9 @@ from perception.pushing import Agreement
 from planners import Gap
 from planners.dynamics import Fault, Reading
 from worlds import ACTIONS, Layout, Outcome
+
+if TYPE_CHECKING:
+    from comparisons.neural import Neural
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +40,7 @@ class Findings:
     globally_optimal: int
     snapshots: dict[Reading, SnapshotTally]
     local_rule: dict[Outcome, int]
+    neural: Neural | None
 
 
 def find(experiment: Experiment) -> Findings:
@@ -56,6 +60,7 @@ def find(experiment: Experiment) -> Findings:
         globally_optimal=dynamic.globally_optimal(experiment.oracle),
         snapshots=judge_all(experiment.oracle, dynamic.verdicts),
         local_rule=experiment.local_rule(),
+        neural=experiment.neural(dynamic),
     )
 
 
@@ -96,6 +101,7 @@ def results(spec: Spec, layout: Layout, grounded: GroundGraph, found: Findings) 
         },
         "dynamic": _dynamic(found),
         "snapshots": _snapshots(layout, grounded, found),
+        "option_critic": _neural(layout, grounded, found.neural),
     }
 
 
@@ -119,6 +125,16 @@ def affordances(layout: Layout, grounded: GroundGraph, run: Run) -> list[dict[st
         if not met:
             rows.append({"obstacle": obstacle.name, "subtask": None, "action": None, "shape": obstacle.kind})
     return rows
+
+
+def _neural(layout: Layout, grounded: GroundGraph, found: Neural | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    numbers = ("steps", "starts", "optimal_starts", "asked", "optimal", "same")
+    return {
+        **{name: getattr(found, name) for name in numbers},
+        "affordances": affordances(layout, grounded, found.example),
+    }
 
 
 def _versions() -> dict[str, str]:

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from comparisons.experiment import Experiment
 from comparisons.report import Report
 from comparisons.results import Findings
-from comparisons.story_dynamic import dynamic, example, replay
+from comparisons.story_dynamic import dynamic, example, neural, replay
 from comparisons.story_learning import graph, learning
 from comparisons.story_parts import percent, share
 from comparisons.story_senses import maze, seeing, static
@@ -15,7 +15,10 @@ from comparisons.story_senses import maze, seeing, static
 
 def tell(experiment: Experiment, found: Findings) -> tuple[Report, dict[str, Figure]]:
     """Return the report and its figures by name."""
-    parts = [write(experiment, found) for write in (maze, graph, static, seeing, learning, example, dynamic)]
+    writers = [maze, graph, static, seeing, learning, example, dynamic]
+    if found.neural is not None:
+        writers.append(neural)
+    parts = [write(experiment, found) for write in writers]
     figures = {name: figure for part in parts for name, figure in part.figures.items()}
     tally, optimal = found.dynamic, sum(pair.optimal for pair in found.pairs)
     judged = len(tally.verdicts)

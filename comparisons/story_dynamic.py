@@ -95,6 +95,30 @@ def dynamic(experiment: Experiment, found: Findings) -> Part:
     return Part(section, {"counterexample": _counterexample(experiment, refuted)})
 
 
+def neural(experiment: Experiment, found: Findings) -> Part:
+    """Report what an option-critic of the same graph affords; it is there unless the run was quick."""
+    critic, tally = found.neural, found.dynamic
+    assert critic is not None, "asked for only where it is there"
+    rows = affordances(experiment.layout, experiment.grounded, critic.example)
+    same = rows == affordances(experiment.layout, experiment.grounded, found.example.with_obstacles)
+    text = (
+        "The same graph, compiled to an option-critic (Bacon, Harb and Precup, 2017): one set of networks "
+        f"for all pairs, after {critic.steps} steps. Its greedy policy takes a shortest way from "
+        f"{critic.optimal_starts} of {critic.starts} pairs and starting cells. Asked for the affordances of "
+        f"the example run it gives {'the same as' if same else 'others than'} MAXQ's values; among the "
+        f"{critic.asked} of the random episodes the local rule picks an action that is proved optimal in "
+        f"{critic.optimal} by its values and in {tally.local_optimal} by MAXQ's, the same one in "
+        f"{critic.same}."
+    )
+    head = ("obstacle", "shape", "subtask", "action")
+    table = Table(
+        "Affordances of the example run by the option-critic's values",
+        head,
+        tuple(tuple(row[name] for name in head) for row in rows),
+    )
+    return Part(Section("Affordances by an option-critic", (text,), tables=(table,)))
+
+
 def _snapshot_text(found: Findings) -> str:
     """Say how often a search that lets no sphere move would have been right."""
     standing = found.snapshots[Reading.STANDING]

@@ -28,6 +28,7 @@ from worlds import (
     maze_variables,
     suggest,
 )
+from worlds.four_rooms import AREAS, HALLWAYS, ROOMS, Rules, four_rooms_model, four_rooms_variables
 from worlds.hdg import LandmarkMaze, landmark_model, landmark_variables
 from worlds.taxi import SITES, TAXI_ACTIONS, taxi_model, taxi_variables
 
@@ -44,6 +45,11 @@ _TAXIS: Final = {  # rain and fickle: Dietterich (2000), section 7.1
     "taxi-rainy-fickle": (0.2, 0.3),
 }
 _HDGS: Final = {"hdg": 0.0, "hdg-slippery": 0.2}
+_FOUR_ROOMS: Final[Mapping[str, tuple[Rules, float]]] = {  # rules and slip
+    "four_rooms": ("bacon", 1 / 3),
+    "four_rooms-sutton": ("sutton", 1 / 3),
+    "four_rooms-sure": ("bacon", 0.0),
+}
 
 
 @dataclass(frozen=True)
@@ -189,6 +195,7 @@ def _ours() -> dict[str, Callable[[], TextWorld]]:
         "two_rooms": lambda: maze_world(load_layout("two_rooms")),
         **{name: partial(_taxi, name) for name in _TAXIS},
         **{name: partial(_hdg, name) for name in _HDGS},
+        **{name: partial(_four_rooms, name) for name in _FOUR_ROOMS},
     }
 
 
@@ -212,3 +219,13 @@ def _hdg(name: str) -> TextWorld:
     return TextWorld(
         name, landmark_variables(maze), ACTIONS, partial(landmark_model, maze, slip=_HDGS[name]), sets
     )
+
+
+def _four_rooms(name: str) -> TextWorld:
+    rules, slip = _FOUR_ROOMS[name]
+    named = {"room": ROOMS, "area": AREAS}
+    sets = tuple(
+        ValueSet(f"{word} {room}", cells) for word, by in named.items() for room, cells in by.items()
+    )
+    model = partial(four_rooms_model, rules=rules, slip=slip)
+    return TextWorld(name, four_rooms_variables(), ACTIONS, model, sets, HALLWAYS)

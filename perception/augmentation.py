@@ -16,8 +16,6 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from worlds import Stream
-
 _WEIGHTS: Final = (0.299, 0.587, 0.114)  # of red, green and blue in brightness (ITU-R BT.601)
 _KERNEL: Final = 11  # pixels; the longest blur
 _SMALLEST: Final = 0.02  # of a frame's area: of patches the smallest
@@ -62,17 +60,6 @@ class Augmentation:
     patch: float = 0.25
 
 
-def generator(*key: int) -> torch.Generator:
-    """Return torch's generator for a stream named by integers.
-
-    >>> torch.rand(2, generator=generator(1, 2)).equal(torch.rand(2, generator=generator(1, 2)))
-    True
-    """
-    made = torch.Generator()
-    made.manual_seed(Stream(*key).bits() >> 1)
-    return made
-
-
 def augment(frames: Tensor, settings: Augmentation, draw: torch.Generator) -> Tensor:
     """Return a batch of frames, each spoilt in its own way.
 
@@ -93,7 +80,7 @@ def augment(frames: Tensor, settings: Augmentation, draw: torch.Generator) -> Te
     Examples
     --------
     >>> frames = torch.full((2, 3, 8, 8), 0.5)
-    >>> augment(frames, Augmentation(), generator(1)).shape
+    >>> augment(frames, Augmentation(), torch.Generator()).shape
     torch.Size([2, 3, 8, 8])
     """
     hide = partial(_hide, most=settings.patch)

@@ -16,12 +16,13 @@ import torch
 from numpy.typing import NDArray
 from torch.nn import functional
 
-from perception.augmentation import Augmentation, augment, generator
+from perception.augmentation import Augmentation, augment
 from perception.labelled import Labelled, checked_data, resized
 from perception.learnt import checked_effort
 from perception.network import Network
 from perception.protocol import LABELS, REACH
 from worlds import UserError
+from worlds.torch_stream import generator
 
 _LEAST_UPDATES: Final = 10
 _INIT, _ORDER, _SPOIL, _DROP = range(4)  # what a stream of the seed is for

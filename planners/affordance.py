@@ -12,6 +12,7 @@ from typing import Protocol
 from hierarchy import GroundGraph
 from planners.maxq import MaxQ
 from planners.search import Replanner
+from planners.task_values import TaskValues
 from worlds import DELTAS, Kind, Layout, MazeState, state_number
 
 
@@ -67,7 +68,7 @@ class LocalRule:
     'East'
     """
 
-    def __init__(self, layout: Layout, learner: MaxQ) -> None:
+    def __init__(self, layout: Layout, learner: TaskValues) -> None:
         self.layout = layout
         self.learner = learner
 
@@ -115,7 +116,7 @@ class LocalRule:
         if not open_to:
             return None
         values = [learner.q(task, state, k) for k in open_to]
-        least = max(values) - learner.settings.tie
+        least = max(values) - learner.tie
         return next(calls[k].child for k, value in zip(open_to, values, strict=True) if value >= least)
 
     def _state(self, belief: MazeState) -> int:
@@ -151,7 +152,7 @@ class Replanning:
             child = self.grounded.nodes[root].calls[k].child
             plan = self.replanner.plan(child, belief)
             value = float("-inf") if plan is None else self.learner.c(root, state, k) - len(plan.actions)
-            if value > best + self.learner.settings.tie:
+            if value > best + self.learner.tie:
                 best, chosen = value, child
         return chosen
 

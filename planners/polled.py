@@ -8,10 +8,10 @@ or a caller that has ended, takes away the choice to go on.
 
 from __future__ import annotations
 
-from planners.learner import Learner
+from planners.task_values import TaskValues
 
 
-def polled_action(learner: Learner, task: int, state: int) -> int:
+def polled_action(learner: TaskValues, task: int, state: int) -> int:
     """Return the primitive action at the end of the best path down from a task in a state.
 
     The task must not have ended there.
@@ -34,7 +34,9 @@ def polled_action(learner: Learner, task: int, state: int) -> int:
     return task
 
 
-def polled_route(learner: Learner, task: int, state: int, limit: int = 1000) -> list[tuple[int, int]] | None:
+def polled_route(
+    learner: TaskValues, task: int, state: int, limit: int = 1000
+) -> list[tuple[int, int]] | None:
     """Return the (state, primitive action) pairs of polled execution, or None past `limit` steps."""
     route: list[tuple[int, int]] = []
     terminal = learner.grounded.nodes[task].terminal
@@ -47,7 +49,7 @@ def polled_route(learner: Learner, task: int, state: int, limit: int = 1000) -> 
     return route
 
 
-def polled_steps(learner: Learner, task: int, state: int, limit: int = 1000) -> int | None:
+def polled_steps(learner: TaskValues, task: int, state: int, limit: int = 1000) -> int | None:
     """Return the primitive steps of polled execution from a state, or None past `limit`."""
     route = polled_route(learner, task, state, limit)
     return None if route is None else len(route)

@@ -7,6 +7,8 @@ from typing import Final
 import torch
 from torch import Tensor
 
+from worlds.randomness import Stream
+
 _GOLDEN: Final = 0x9E37_79B9_7F4A_7C15
 _LOW: Final = 0xFFFF_FFFF
 
@@ -68,3 +70,30 @@ def nth(flags: Tensor, n: Tensor) -> Tensor:
     [2, 3]
     """
     return (flags.long().cumsum(1) <= n[:, None]).sum(1)
+
+
+def fractions(key: Tensor, counter: Tensor) -> Tensor:
+    """Return a draw of each stream as a whole number below 2**53; over 2**53 it is `Stream.uniform`.
+
+    Examples
+    --------
+    >>> from worlds import Stream
+    >>> stream = Stream(7)
+    >>> key = torch.tensor([_signed(stream.key)])
+    >>> int(fractions(key, torch.tensor([1]))[0]) / 2**53 == stream.uniform()
+    True
+    """
+    return _right(bits(key + counter * _signed(_GOLDEN), 0), 11)
+
+
+def generator(*key: int) -> torch.Generator:
+    """Return torch's generator for the stream that integers name.
+
+    Examples
+    --------
+    >>> torch.rand(2, generator=generator(1, 2)).equal(torch.rand(2, generator=generator(1, 2)))
+    True
+    """
+    made = torch.Generator()
+    made.manual_seed(Stream(*key).bits() >> 1)
+    return made

@@ -138,6 +138,8 @@ class Compiled(ABC, Generic[L]):
         starts: Sequence[int],
         episodes: int,
         after_each: Callable[[], None] | None = None,
+        *,
+        afresh: bool = True,
     ) -> Steps:
         """Run episodes of a task in every run, each from a random one of `starts`.
 
@@ -154,6 +156,8 @@ class Compiled(ABC, Generic[L]):
             Episodes of each run.
         after_each
             Called after every episode of all runs, to take a measurement.
+        afresh
+            Whether the task's rate and exploration start afresh; if not, they go on falling.
 
         Returns
         -------
@@ -168,7 +172,8 @@ class Compiled(ABC, Generic[L]):
             If the task comes to a state in which it has no child to call, or there is nothing to start from.
         """
         begin = self._checked(task, starts)
-        self.episodes[:, task] = 0
+        if afresh:
+            self.episodes[:, task] = 0
         steps = np.zeros((len(self.seeds), episodes), dtype=np.int32)
         if after_each is None:
             self._learn(task, begin, steps)

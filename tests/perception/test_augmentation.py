@@ -6,7 +6,8 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from perception.augmentation import Augmentation, augment, generator
+from perception.augmentation import Augmentation, augment
+from worlds.torch_stream import generator
 
 PATCH_ONLY = Augmentation(
     darkest=1.0, brightest=1.0, tint=0.0, saturation=0.0, noisy=0.0, blurred=0.0, coarse=0.0, hidden=1.0

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 import perception
-from perception.augmentation import Augmentation, generator
+from perception.augmentation import Augmentation
 from perception.cnn import Cnn
 from perception.labelled import PIXELS, Rows, held_out, resized
 from perception.models import Card, save_model
@@ -16,6 +16,7 @@ from perception.pushed import PushedFrames, pushed_frames
 from perception.training import Training, train
 from perception.variation import CLEAN
 from worlds import UserError
+from worlds.torch_stream import generator
 
 QUICK = Training(updates=12, batch=16)
 

@@ -66,7 +66,7 @@ def test_a_save_that_fails_leaves_the_old_file(
     def full(*_: Any) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(*((models.os, "fsync") if stop == "fsync" else (Path, "replace")), full)
+    monkeypatch.setattr(*((os, "fsync") if stop == "fsync" else (Path, "replace")), full)
     with pytest.raises(UserError, match="No space left on device"):
         save_model(saved, {"w": np.zeros(1)}, CARD)
     monkeypatch.undo()

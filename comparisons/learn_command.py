@@ -1,0 +1,283 @@
+"""`affordant learn`: a learner on a task graph, held to the oracle while it learns; it can be broken off."""
+
+from __future__ import annotations
+
+import csv
+import io
+import shlex
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from comparisons.learn_line import Line, Measured
+from comparisons.learn_registry import Request, Run, new_run
+from comparisons.learn_stopping import told_to_stop
+from comparisons.outputs import refuse_existing
+from hierarchy.check import checked
+from hierarchy.text import graph_text, load_graph, load_world
+from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
+from worlds.errors import UserError
+from worlds.tensor_file import replace_files
+
+CHECKPOINT: Final = "checkpoint.safetensors"
+CURVE: Final = "curve.csv"
+EVERY: Final = 20.0
+"""Seconds between two checkpoints."""
+_FIXED: Final = ("steps", "share_optimal", "share_ending", "mean_return", "mean_loss")
+
+
+@dataclass(frozen=True)
+class Spec:
+    """What `affordant learn` was asked for; see `comparisons.cli.learn`."""
+
+    graph: str
+    out: Path
+    learner: str = "option-critic"
+    world: str | None = None
+    seed: int = 0
+    config: Path | None = None
+    settings: Mapping[str, str] = field(default_factory=dict)
+    steps: int | None = None
+    tolerance: float = 0.0
+    resume: bool = False
+
+
+def named_settings(pairs: tuple[str, ...], terminations: str | None = None) -> dict[str, str]:
+    """Return settings by name from what stands on a command line.
+
+    Raises
+    ------
+    UserError
+        If one has no name, or one is given twice.
+
+    Examples
+    --------
+    >>> named_settings(("rate=1e-3", "gamma=0.9"), "prior")
+    {'terminations': 'prior', 'rate': '1e-3', 'gamma': '0.9'}
+    """
+    found = {} if terminations is None else {"terminations": terminations}
+    for pair in pairs:
+        name, equals, value = pair.partition("=")
+        if not equals:
+            raise UserError(f"--set {pair}: there is no '='; write NAME=VALUE, such as rate=1e-3")
+        if name in found:
+            raise UserError(f"--set {pair}: {name} is given already; give it once")
+        found[name] = value
+    return found
+
+
+class Outcome(NamedTuple):
+    """What came of learning: the summary, and whether it came to the line."""
+
+    text: str
+    reached: bool
+
+
+def learn(spec: Spec, console: Console) -> Outcome:
+    """Learn until the oracle agrees or the steps are done; Ctrl-C and SIGTERM save what was learnt.
+
+    Raises
+    ------
+    UserError
+        If the graph, the learner, its settings or the folder will not do.
+    KeyboardInterrupt, SystemExit
+        If it was told to stop; then what was learnt has been saved.
+    """
+    if not 0 <= spec.seed < 1 << 63:
+        raise UserError(f"--seed {spec.seed}: give a whole number from 0 to 9223372036854775807")
+    if not 0 <= spec.tolerance < float("inf"):
+        raise UserError(f"--tolerance {spec.tolerance}: give a number from 0 on")
+    if spec.steps is not None and spec.steps < 1:
+        raise UserError(f"--steps {spec.steps}: give at least 1")
+    if not spec.resume:
+        refuse_existing(spec.out)
+    graph, world = load_graph(spec.graph, None if spec.world is None else load_world(spec.world))
+    grounded = checked(graph, world.model())
+    line = Line.of(grounded)
+    run = new_run(Request(spec.learner, grounded, spec.seed, spec.config, dict(spec.settings), spec.steps))
+    about = Checkpoint(
+        spec.learner, graph_text(graph, world), world.name, spec.seed, dict(run.settings), digest(grounded), 0
+    )
+    session = _Session(spec, run, line, about)
+    if spec.resume:
+        session.take_up(console)
+    if not session.over():
+        with _folder(spec.out):
+            session.learn(console)
+    return session.outcome()
+
+
+class _Session:
+    """A run, its learning curve, and where they are kept."""
+
+    def __init__(self, spec: Spec, run: Run, line: Line, about: Checkpoint) -> None:
+        self.spec, self.run, self.line, self.about = spec, run, line, about
+        self.path = spec.out / CHECKPOINT
+        self.steps, self.total = 0, int(run.settings["total"])
+        self.columns: tuple[str, ...] = _FIXED
+        self.rows: list[tuple[float, ...]] = []
+
+    @property
+    def last(self) -> Measured | None:
+        """What was measured last."""
+        return Measured(*self.rows[-1][1 : len(_FIXED)]) if self.rows else None
+
+    def over(self) -> bool:
+        """Return whether there is nothing left to learn, or no step left to learn it in."""
+        last = self.last
+        return self.steps >= self.total or (last is not None and last.enough(self.spec.tolerance))
+
+    def take_up(self, console: Console) -> None:
+        """Go on from the checkpoint."""
+        if not self.path.exists():
+            raise UserError(f"--resume: {self.path} is not there; leave --resume out to begin")
+        stored = load_checkpoint(self.path)
+        _refuse_other(self.path, stored.about, self.about)
+        restore(self.path, stored, self.run)
+        for name, was in stored.about.versions.items():
+            if was != (now := self.about.versions.get(name)):
+                console.print(f"note: it was begun with {name} {was}, this is {now}; bits may differ")
+        self.steps, self.columns = stored.about.steps, stored.about.columns
+        self.rows = [tuple(row) for row in stored.curve.tolist()]
+
+    def learn(self, console: Console) -> None:
+        """Learn until it is over, or until told to stop."""
+        saved = time.monotonic()
+        with told_to_stop() as told, _bar(console, self) as show, closing(self.run.learn()) as pieces:
+            for steps, measures in pieces:
+                self.steps = steps
+                _refuse_astray(steps, measures)
+                if self.run.due() or steps >= self.total:
+                    self.evaluate(measures)
+                show()
+                if told or self.over():
+                    break
+                if time.monotonic() - saved > EVERY:
+                    self.save()
+                    saved = time.monotonic()
+            self.save()
+        if told and not self.over():
+            going_on = f"stopped after {self.steps} steps; to go on: {self.command()}"
+            console.print(going_on, soft_wrap=True, markup=False, highlight=False)
+            told.obey()
+
+    def evaluate(self, measures: Mapping[str, float]) -> None:
+        """Add a row to the learning curve."""
+        if not self.rows:
+            self.columns = (*_FIXED, *measures)
+        others = (float(measures.get(name, float("nan"))) for name in self.columns[len(_FIXED) :])
+        self.rows.append((float(self.steps), *self.line.measure(self.run.greedy()), *others))
+
+    def save(self) -> None:
+        """Write checkpoint and curve."""
+        curve = np.array(self.rows, dtype=np.float64).reshape(len(self.rows), len(self.columns))
+        about = replace(self.about, steps=self.steps, columns=self.columns)
+        save_checkpoint(self.path, about, self.run.state(), curve)
+        replace_files({self.spec.out / CURVE: _csv(self.columns, self.rows).encode()})
+
+    def command(self) -> str:
+        """Return the command that goes on."""
+        spec = self.spec
+        words = ["affordant", "learn", spec.graph, "--learner", spec.learner]
+        words += ["--world", spec.world] if spec.world is not None else []
+        words += ["--seed", str(spec.seed)] if spec.seed else []
+        words += ["--config", str(spec.config)] if spec.config is not None else []
+        for name, text in spec.settings.items():
+            words += ["--terminations", text] if name == "terminations" else ["--set", f"{name}={text}"]
+        words += ["--steps", str(spec.steps)] if spec.steps is not None else []
+        words += ["--tolerance", f"{spec.tolerance:g}"] if spec.tolerance else []
+        return shlex.join([*words, "--out", str(spec.out), "--resume"])
+
+    def outcome(self) -> Outcome:
+        """Return the summary."""
+        line, spec = self.line, self.spec
+        # A run that goes on for fewer steps than it has made may never have been evaluated.
+        last = self.last or line.measure(self.run.greedy())
+        count, best = len(line.starts), float(line.best.mean())
+        optimal, ending = round(last.share_optimal * count), round(last.share_ending * count)
+        text = [
+            f"task graph {spec.graph} on world {self.about.world}: {spec.learner}, seed {spec.seed}, "
+            f"{self.steps} steps",
+            f"optimal from {optimal} of {count} starts; ends from {ending}",
+        ]
+        if ending == count:
+            text.append(f"mean return {last.mean_return:.4g}, the best possible {best:.4g}")
+        text += [str(self.path), str(spec.out / CURVE)]
+        return Outcome("\n".join(text), last.enough(spec.tolerance))
+
+
+def _refuse_astray(steps: int, measures: Mapping[str, float]) -> None:
+    """Refuse to go on, and to keep, what has no finite numbers any more."""
+    for name, value in measures.items():
+        if not np.isfinite(value):
+            raise UserError(
+                f"learning went astray: after {steps} steps {name} is {value}; "
+                "lower the setting rate, or give another seed"
+            )
+
+
+def _refuse_other(path: Path, was: Checkpoint, now: Checkpoint) -> None:
+    """Refuse to go on with another run; only the number of steps may have changed."""
+    pairs: dict[str, tuple[Any, Any]] = {
+        "--learner": (was.learner, now.learner),
+        "--seed": (was.seed, now.seed),
+        "--world": (was.world, now.world),
+    }
+    for name in now.config:
+        if name != "total":
+            pairs[f"setting {name}"] = (was.config.get(name), now.config[name])
+    for name, (before, after) in pairs.items():
+        if before != after:
+            raise UserError(
+                f"{path}: begun with {name} {before}, not {after}; give the same, or another --out"
+            )
+    if was.graph != now.graph:
+        raise UserError(f"{path}: this run is of another task graph; give the same, or another --out")
+
+
+@contextmanager
+def _folder(out: Path) -> Iterator[None]:
+    """Make the folder at once, so that nothing is learnt in vain; take it away if it stays empty."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise UserError(f"--out {out}: it cannot be made ({error.strerror}); name another place") from error
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # it holds what was learnt
+            out.rmdir()
+
+
+@contextmanager
+def _bar(console: Console, session: _Session) -> Iterator[Callable[[], None]]:
+    """Show how far a session is; what is yielded brings it up to date."""
+    columns = (TextColumn("{task.description}"), BarColumn(16), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("learning", total=session.total, completed=session.steps)
+
+        def show() -> None:
+            last = session.last
+            told = "" if last is None else f", {100 * last.share_optimal:.1f} % optimal"
+            if last is not None and last.share_ending == 1:
+                told += f", return {last.mean_return:.4g}, best {last.mean_return + last.mean_loss:.4g}"
+            progress.update(task, completed=session.steps, description=f"{session.steps} steps{told}")
+
+        yield show
+
+
+def _csv(columns: tuple[str, ...], rows: list[tuple[float, ...]]) -> str:
+    """Return the curve as CSV; what could not be measured is left empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    for steps, *others in rows:
+        writer.writerow([int(steps), *("" if np.isnan(value) else f"{value:.9g}" for value in others)])
+    return text.getvalue()

@@ -1,0 +1,177 @@
+"""Arrays on disk as safetensors, with words in the header: written whole or not at all, read with care.
+
+Such a file holds numbers and text, nothing that is ever executed. `perception.models` and
+`planners.option_critic.checkpoint` say what the words are.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from safetensors import SafetensorError
+from safetensors.numpy import load, save
+
+from worlds.errors import UserError
+
+MOST_BYTES: Final = 256 << 20
+"""A file may be so large."""
+_MOST_HEADER: Final = 1 << 20  # bytes; the words, and a line for each array
+_KINDS: Final = "biuf"  # numpy's kinds of bool, integers and floats
+_LENGTH: Final = 8  # bytes that give the length of the header
+
+Tensors = dict[str, NDArray[Any]]
+"""Arrays by name."""
+
+
+class TensorFile(NamedTuple):
+    """What such a file holds: arrays by name, and words by key."""
+
+    tensors: Tensors
+    words: dict[str, str]
+
+
+def tensor_bytes(path: Path, tensors: Mapping[str, NDArray[Any]], words: Mapping[str, str]) -> bytes:
+    """Return a file's content, the same for the same arrays and words in any order.
+
+    Parameters
+    ----------
+    path
+        Where it is to go, for messages.
+    tensors
+        Arrays of bool, integers or finite floats, by name.
+    words
+        Text by key.
+
+    Raises
+    ------
+    UserError
+        If the path has another ending than ".safetensors", or an array will not do.
+
+    Examples
+    --------
+    >>> content = tensor_bytes(Path("m.safetensors"), {"w": np.eye(2)}, {"card": "mine"})
+    >>> content[8:46]
+    b'{"__metadata__":{"card":"mine"},"w":{"'
+    """
+    named(path)
+    arrays = {name: native(path, name, np.asarray(tensor)) for name, tensor in tensors.items()}
+    content = save(arrays, dict(words))
+    _words(path, content)  # what could not be read again is not written
+    return content
+
+
+def read_tensors(path: Path, missing: str, most: int = MOST_BYTES) -> TensorFile:
+    """Read a file that `tensor_bytes` gave.
+
+    Parameters
+    ----------
+    path
+        The file.
+    missing
+        What to do where there is none.
+    most
+        Bytes that it may have.
+
+    Raises
+    ------
+    UserError
+        If there is no such file, it is too large or broken, or an array holds what is no finite number.
+    """
+    named(path)
+    content = read_bytes(path, most, missing)
+    try:
+        tensors: Tensors = load(content)
+    # KeyError: a type that numpy does not have; the others: a header that contradicts what follows it.
+    except (SafetensorError, KeyError, ValueError, TypeError) as error:
+        raise UserError(
+            f"{path}: this is no safetensors file, or a broken one ({error}); copy it anew"
+        ) from error
+    words = _words(path, content)
+    for name, tensor in tensors.items():
+        native(path, name, tensor)
+    return TensorFile(tensors, words)
+
+
+def named(path: Path | str) -> Path:
+    """Return a path that ends in ".safetensors", or raise a `UserError`."""
+    path = Path(path)
+    if path.suffix != ".safetensors":
+        raise UserError(f"{path}: weights are kept in files that end in .safetensors; name it so")
+    return path
+
+
+def native(path: Path, name: str, tensor: NDArray[Any]) -> NDArray[Any]:
+    """Return an array in the machine's byte order and C order, if it holds numbers and all are finite."""
+    if tensor.dtype.kind not in _KINDS:
+        raise UserError(f"{path}: tensor {name!r} is of type {tensor.dtype}; use bool, integers or floats")
+    if tensor.dtype.kind == "f" and not np.isfinite(tensor).all():
+        raise UserError(f"{path}: tensor {name!r} holds numbers that are not finite; train it anew")
+    return np.asarray(tensor, dtype=tensor.dtype.newbyteorder("="), order="C")
+
+
+def read_bytes(path: Path, most: int, missing: str) -> bytes:
+    """Return what an ordinary file of at most `most` bytes holds, or raise a `UserError`."""
+    try:
+        if not path.exists():
+            raise UserError(f"{path}: there is no such file; {missing}")
+        if not path.is_file():
+            raise UserError(f"{path}: this is no ordinary file; name one")
+        with path.open("rb") as file:
+            content = file.read(most + 1)
+    except OSError as error:
+        raise UserError(
+            f"{path}: it cannot be read ({error.strerror}); check the path and its rights"
+        ) from error
+    if len(content) > most:
+        raise UserError(
+            f"{path}: the file is larger than {most} bytes; it holds something else than is looked for"
+        )
+    return content
+
+
+def replace_file(path: Path, content: bytes) -> None:
+    """Write a file beside and move it into place, so that no reader ever sees half of it."""
+    new = path.with_name(f".{path.name}.{os.getpid()}.new")
+    try:
+        with new.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    finally:
+        with suppress(FileNotFoundError):
+            new.unlink()
+
+
+def replace_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files of one folder, one after the other; the folder is made if it is missing.
+
+    Raises
+    ------
+    UserError
+        If nothing can be written there; a file is then as it was before.
+    """
+    for path, content in contents.items():
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(path, content)
+        except OSError as error:
+            raise UserError(
+                f"{path}: it cannot be written ({error.strerror}); name another folder"
+            ) from error
+
+
+def _words(path: Path, content: bytes) -> dict[str, str]:
+    """Return the header's own words; `content` has been read as safetensors before."""
+    length = int.from_bytes(content[:_LENGTH], "little")
+    if length > _MOST_HEADER:
+        raise UserError(f"{path}: the header has {length} bytes, more than {_MOST_HEADER}; save it anew")
+    header: dict[str, dict[str, str]] = json.loads(content[_LENGTH : _LENGTH + length])
+    return header.get("__metadata__") or {}
