@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from perception.labelled import Labelled, resized
 from perception.learnt import Learnt
 from perception.models import Card, Tensors
-from perception.network import SHAPES, scores
+from perception.network import SHAPES, last_map, scores
 from perception.percepts import checked_frames
 from perception.protocol import LABELS, Frames
 from perception.training import Training, one_thread, train
@@ -61,6 +61,16 @@ class Cnn(Learnt):
                 for frame in seen
             ]
             result: NDArray[np.float32] = torch.cat(found).cpu().numpy()
+        return result
+
+    def features(self, frames: Frames) -> NDArray[np.float32]:
+        """Return what the heads of the network see of frames, shape (frames, `network.FEATURES`)."""
+        seen = torch.from_numpy(resized(checked_frames(frames)))
+        with one_thread(), torch.inference_mode():
+            inputs = (frame.to(self.device).permute(2, 0, 1)[None].float() / 255 for frame in seen)
+            result: NDArray[np.float32] = (
+                torch.cat([last_map(self._there, one) for one in inputs]).cpu().numpy()
+            )
         return result
 
     def fit(

@@ -24,10 +24,13 @@ _HIDDEN: Final = 32
 _FAINT: Final = 1e-4  # of the range of colours: less than this is no picture
 _PLACES: Final = (PIXELS // 16) ** 2  # of the map that the heads see
 
+FEATURES: Final = CONVOLUTIONS[-1][1] * _PLACES
+"""Numbers of the last map of a frame."""
+
 SHAPES: Final[Mapping[str, tuple[int, ...]]] = {
     **{f"conv{i}.weight": (out, into, 3, 3) for i, (into, out, _) in enumerate(CONVOLUTIONS)},
     **{f"conv{i}.bias": (out,) for i, (_, out, _) in enumerate(CONVOLUTIONS)},
-    "hidden.weight": (_HIDDEN, CONVOLUTIONS[-1][1] * _PLACES),
+    "hidden.weight": (_HIDDEN, FEATURES),
     "hidden.bias": (_HIDDEN,),
     "heads.weight": (SCORES, _HIDDEN),
     "heads.bias": (SCORES,),
@@ -133,10 +136,21 @@ def scores(tensors: Mapping[str, Tensor], frames: Tensor) -> Tensor:
     >>> torch.allclose(scores(tensors, frames), network(frames), atol=1e-5)
     True
     """
+    x = last_map(tensors, frames)
+    x = functional.linear(x, tensors["hidden.weight"], tensors["hidden.bias"]).relu_()
+    return functional.linear(x, tensors["heads.weight"], tensors["heads.bias"])
+
+
+def last_map(tensors: Mapping[str, Tensor], frames: Tensor) -> Tensor:
+    """Return the last map of the folded network, which its heads see, shape (frames, `FEATURES`).
+
+    Parameters
+    ----------
+    tensors, frames
+        As `scores` takes them.
+    """
     x = standardised(frames)
     for i, (_, _, stride) in enumerate(CONVOLUTIONS):
         weight, bias = tensors[f"conv{i}.weight"], tensors[f"conv{i}.bias"]
         x = functional.conv2d(x, weight, bias, stride, 1).relu_()
-    x = functional.max_pool2d(x, 2).flatten(1)
-    x = functional.linear(x, tensors["hidden.weight"], tensors["hidden.bias"]).relu_()
-    return functional.linear(x, tensors["heads.weight"], tensors["heads.bias"])
+    return functional.max_pool2d(x, 2).flatten(1)

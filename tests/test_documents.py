@@ -46,6 +46,7 @@ def test_the_readme_links_to_files_that_are_there() -> None:
         ("own_backend", "hough: "),
         ("taxi", "greedy steps are optimal from 100 of 100 sampled starts"),
         ("hdg", "by 3 landmarks it takes 4.32 steps on average, 3.33 at best"),
+        ("option_critic_from_pixels", "optimal from 496 of 496 starts"),
         ("four_rooms_key", "the learnt way is a shortest one from 87 of 87 starts"),
     ],
 )
@@ -59,5 +60,13 @@ def test_examples_print_their_findings(name: str, expected: str) -> None:
 
 def test_every_example_is_tested() -> None:
     """No example stands in the folder that the test above leaves out."""
-    tested = {"own_task_graph", "affordances", "own_backend", "taxi", "hdg", "four_rooms_key"}
+    tested = {
+        "own_task_graph",
+        "affordances",
+        "own_backend",
+        "taxi",
+        "hdg",
+        "four_rooms_key",
+        "option_critic_from_pixels",
+    }
     assert {path.stem for path in (ROOT / "examples").glob("*.py")} == tested

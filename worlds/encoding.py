@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, Self
 
 import numpy as np
 import torch
@@ -58,6 +58,49 @@ class Encoding:
         self._whole = index.size * len(self.columns) <= _MOST
         if self._whole:
             self._tables = [self._joined(torch.arange(index.size, device=device))]
+
+    @classmethod
+    def of_table(
+        cls,
+        index: StateIndex,
+        seen: NDArray[np.float32],
+        columns: Iterable[str],
+        device: torch.device | str | None = None,
+    ) -> Self:
+        """Return an encoding of one's own, such as what a camera's frames are made into.
+
+        Parameters
+        ----------
+        index
+            Numbers the states.
+        seen
+            What is seen of every state, shape (states, columns).
+        columns
+            For each column the variable that it tells of.
+        device
+            Where the tensors live.
+
+        Raises
+        ------
+        UserError
+            If the shape does not fit, or a column tells of no variable.
+
+        Examples
+        --------
+        >>> from worlds import StateIndex, Variable
+        >>> index = StateIndex((Variable("x", (0, 1, 2)),))
+        >>> Encoding.of_table(index, np.array([[0.0], [0.5], [1.0]], np.float32), ["x"])(torch.tensor([2]))
+        tensor([[1.]])
+        """
+        named = tuple(columns)
+        if seen.shape != (index.size, len(named)):
+            wanted = (index.size, len(named))
+            raise UserError(f"a table of shape {seen.shape} does not fit; give (states, columns) = {wanted}")
+        found = cls(index, device)
+        found.columns, found._whole = named, True
+        found.reading(named)  # refuses names that are no variables
+        found._tables = [torch.as_tensor(seen, dtype=torch.float32, device=device)]
+        return found
 
     def __call__(self, state: Tensor) -> Tensor:
         """Return what states of some numbers look like, shape (*state.shape, columns), float32."""

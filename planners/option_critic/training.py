@@ -20,9 +20,11 @@ from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.greedy import GreedyPolicy
 from planners.option_critic.loss import OptionCriticLoss
 from planners.option_critic.networks import Actor, Critic, Terminations, called_tasks, columns_of
-from planners.option_critic.options import NONE, compile_options
+from planners.option_critic.options import NONE, Options, compile_options
 from planners.option_critic.policy import OptionPolicy
 from planners.option_critic.transform import TaskStack
+from worlds import UserError
+from worlds.encoding import Encoding
 from worlds.model_env import ModelTorchEnv
 from worlds.torch_stream import generator
 
@@ -55,8 +57,15 @@ class OptionCritic:
         What to learn with. Defaults to ``OptionCriticConfig()``.
     starts
         Where episodes of learning begin, shape (states,), bool. Defaults to the model's starts.
+    encoding
+        What the networks see of a state. Defaults to ``Encoding(grounded.model.index)``.
     device
         Where torch computes.
+
+    Raises
+    ------
+    UserError
+        If there is no start, or the root may call nothing in one; if the graph has findings or is too large.
     """
 
     def __init__(
@@ -66,6 +75,7 @@ class OptionCritic:
         config: OptionCriticConfig | None = None,
         *,
         starts: NDArray[np.bool_] | None = None,
+        encoding: Encoding | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
         self.grounded, self.seed = grounded, seed
@@ -78,8 +88,10 @@ class OptionCritic:
             config.num_envs,
             starts=starts,
             max_steps=config.max_steps,
+            encoding=encoding,
             device=device,
         )
+        _refuse_idle(options, grounded.model.starts if starts is None else starts)
         self.stack = TaskStack(options)
         self.env = TransformedEnv(self.world, self.stack)
         self.env.set_seed(seed)
@@ -267,6 +279,19 @@ def _used(batch: TensorDictBase) -> dict[str, float]:
         "option_duration": batch.get("option").numel() / max(1, chosen.numel()),
         "usage_entropy": abs(float(entropy)),
     }
+
+
+def _refuse_idle(options: Options, starts: NDArray[np.bool_]) -> None:
+    """Refuse to begin in a state in which the root may call nothing."""
+    idle = np.flatnonzero(starts & ~options.initiation[:, 0].any(axis=1))
+    if idle.size:
+        index = options.grounded.model.index
+        values = zip(index.variables, index.state(int(idle[0])), strict=True)
+        where = ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in values)
+        raise UserError(
+            f"{idle.size} of {int(starts.sum())} starts leave the root nothing to call, such as state "
+            f"{idle[0]} ({where}); give starts from which a task can be called"
+        )
 
 
 def _under(prefix: str, tensors: Mapping[str, torch.Tensor]) -> dict[str, torch.Tensor]:

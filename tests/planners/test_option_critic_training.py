@@ -153,3 +153,15 @@ def test_a_learner_is_loaded_with_its_graph_and_world(
         save_checkpoint(path, wrong, learner.state())
         with pytest.raises(UserError, match=problem):
             load_option_critic(path)
+
+
+def test_a_start_with_nothing_to_call_is_refused(small: tuple[GroundGraph, Path]) -> None:
+    """On the trigger with doors closed the paper's root has no child: the message names such a state."""
+    grounded, _ = small
+    idle = np.ones(grounded.model.index.size, dtype=np.bool_)
+    idle &= ~np.any([call.available for call in grounded.nodes[grounded.root].calls], axis=0)
+    idle &= ~grounded.nodes[grounded.root].terminal
+    starts = grounded.model.starts.copy()
+    starts[np.flatnonzero(idle)[0]] = True
+    with pytest.raises(UserError, match=r"1 of \d+ starts leave the root nothing to call.*robot = "):
+        OptionCritic(grounded, 0, SMALL, starts=starts)

@@ -1,5 +1,6 @@
 """What networks see of states: which columns there are, and which of them are on."""
 
+import numpy as np
 import pytest
 import torch
 from hypothesis import given
@@ -104,3 +105,25 @@ def test_an_unknown_variable_is_refused() -> None:
     seen = Encoding(StateIndex(maze_variables(load_layout("two_rooms"))))
     with pytest.raises(UserError, match="there is no state variable 'goals'; did you mean 'goal'"):
         seen.reading(["robot", "goals"])
+
+
+def test_an_encoding_of_ones_own_is_taken_as_it_is() -> None:
+    """A table of numbers is looked up by state, and its columns are read by the variables they tell of."""
+    index = StateIndex((Variable("x", (0, 1, 2)), Variable("door", ("shut", "open"))))
+    seen = np.arange(18, dtype=np.float32).reshape(6, 3)
+    encoding = Encoding.of_table(index, seen, ["x", "x", "door"])
+    assert encoding(torch.tensor([[5], [0]])).tolist() == [[[15.0, 16.0, 17.0]], [[0.0, 1.0, 2.0]]]
+    assert encoding.reading(["x"]).tolist() == [True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("shape", "columns", "message"),
+    [((5, 1), ["x"], r"shape \(5, 1\) does not fit"), ((6, 1), ["y"], "no state variable 'y'")],
+)
+def test_a_table_that_does_not_fit_is_refused(
+    shape: tuple[int, int], columns: list[str], message: str
+) -> None:
+    """Too few rows, or a column of a variable that the world lacks."""
+    index = StateIndex((Variable("x", (0, 1, 2)), Variable("door", ("shut", "open"))))
+    with pytest.raises(UserError, match=message):
+        Encoding.of_table(index, np.zeros(shape, np.float32), columns)
