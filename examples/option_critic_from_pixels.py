@@ -1,7 +1,7 @@
 """An option-critic that sees the maze through the robot's camera: four looks around, as a CNN sees them.
 
-World, graph and learner are those of `affordant learn two_rooms`; only the encoding is another. Where the robot
-stands, and whether the doors are open, it can tell from its frames alone.
+World, graph and learner are those of `affordant learn two_rooms`; only the encoding is another. Where the
+robot stands, and whether the doors are open, it can tell from its frames alone.
 """
 
 import numpy as np
