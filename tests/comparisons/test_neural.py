@@ -27,7 +27,7 @@ def test_one_option_critic_affords_what_the_paper_says() -> None:
     pair = PairLearner(MAZE, grounded, MAZE.trigger, MAZE.goal, seed=0, runs=1)
     pair.learn()
     verdicts = []
-    for number in range(40):
+    for number in range(300):
         episode, *which = random_episode(MAZE, 0, number)
         if which == [MAZE.trigger, MAZE.goal]:
             robot = Robot(MAZE, grounded, Replanning(oracle, pair.learner), Sight(MAZE, Truth()))
