@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from comparisons.conformance_backend import check_backend
 from comparisons.conformance_env import check_box
-from comparisons.conformance_parts import ConformanceError, hold, sample, state_words
+from comparisons.conformance_parts import ConformanceError, hold, sample
 from hierarchy import Constant, GroundGraph, Predicate, TaskGraph, checked, prove_abstraction, two_rooms
 from hierarchy.check import examine
 from planners import task_field
@@ -106,7 +106,7 @@ def _nowhere(
     if wrong.any():
         state, action = (int(each) for each in np.argwhere(wrong)[0])
         said = problem if numbers is None else problem.format(numbers[state, action])
-        raise ConformanceError(f"{said} in {state_words(model, state)}, action {model.actions[action]}")
+        raise ConformanceError(f"{said} in {model.index.words(state)}, action {model.actions[action]}")
 
 
 def check_graph(graph: TaskGraph, model: TransitionModel, *, safe: bool = False) -> None:
@@ -156,7 +156,7 @@ def _meant(model: TransitionModel, what: str, predicate: Predicate, binding: dic
         values = dict(zip(model.index.names, model.index.state(number), strict=True)) | bound
         hold(
             bool(mask[number]) == predicate.holds(values),
-            f"{what} ({predicate}) and its mask differ in {state_words(model, number)}",
+            f"{what} ({predicate}) and its mask differ in {model.index.words(number)}",
         )
 
 
@@ -206,7 +206,7 @@ def check_learner(make: Callable[[GroundGraph, tuple[int, ...]], Learner], episo
     hold(values(learner) != fresh, f"{episodes} episodes changed no value; let train learn")
     for state in states:
         steps, best = learner.greedy_steps(place, state), int(distance[state])
-        where = state_words(grounded.model, state)
+        where = grounded.model.index.words(state)
         hold(
             steps == best,
             f"after {episodes} episodes its policy takes {steps} steps, not {best}, from {where}",

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from gymnasium.utils.env_checker import check_env
 
-from comparisons.conformance_parts import ConformanceError, hold, state_words
+from comparisons.conformance_parts import ConformanceError, hold
 from worlds import Stream, TransitionModel
 from worlds.black_box import BlackBox, Move
 
@@ -62,7 +62,7 @@ def check_box(model: TransitionModel, box: BlackBox, episodes: int = 60) -> None
         _same(model, (start, life), _lived(box, seed, seed), seed)
         if not model.starts[start]:
             raise ConformanceError(
-                f"an episode begins in {state_words(model, start)}, which is no start of the model"
+                f"an episode begins in {model.index.words(start)}, which is no start of the model"
             )
         for state, action, move in life:
             _follows(model, state, action, move)
@@ -97,11 +97,11 @@ def _same(model: TransitionModel, one: tuple[int, Life], other: tuple[int, Life]
     """Refuse two episodes of one seed that differ."""
     mend = "draw every random number from the generator that reset(seed=...) seeds"
     if one[0] != other[0]:
-        where = f"{state_words(model, one[0])}, and then in {state_words(model, other[0])}"
+        where = f"{model.index.words(one[0])}, and then in {model.index.words(other[0])}"
         raise ConformanceError(f"with seed {seed} an episode begins in {where}; {mend}")
     for (state, action, move), (_, _, again) in zip(one[1], other[1], strict=False):
         if move != again:
-            where = f"{state_words(model, state)}, action {model.actions[action]}"
+            where = f"{model.index.words(state)}, action {model.actions[action]}"
             raise ConformanceError(
                 f"with seed {seed} the same actions led to something else in {where}; {mend}"
             )
@@ -112,11 +112,11 @@ def _follows(model: TransitionModel, state: int, action: int, move: Move) -> Non
     occurs = model.probabilities[state, action] > 0
     rewarded = occurs & np.isclose(model.outcome_rewards[state, action], move.reward)
     here = model.outcomes[state, action]
-    where = f"in {state_words(model, state)}, action {model.actions[action]}"
+    where = f"in {model.index.words(state)}, action {model.actions[action]}"
     known = sorted({int(each) for each in here[occurs]})
     if not move.terminated and move.state not in known:
-        listed = " or ".join(f"({state_words(model, each)})" for each in known)
-        raise ConformanceError(f"{where} led to ({state_words(model, move.state)}); the model says {listed}")
+        listed = " or ".join(f"({model.index.words(each)})" for each in known)
+        raise ConformanceError(f"{where} led to ({model.index.words(move.state)}); the model says {listed}")
     if not (rewarded if move.terminated else rewarded & (here == move.state)).any():
         there = occurs if move.terminated else occurs & (here == move.state)
         listed = " or ".join(f"{each:g}" for each in np.unique(model.outcome_rewards[state, action][there]))
@@ -138,8 +138,8 @@ def _frequencies(model: TransitionModel, seen: Counter[tuple[int, int, int]]) ->
             off = abs(seen[state, action, after] - times * chance)
             spread = (times * chance * (1 - chance)) ** 0.5
             if times * chance >= _EXPECTED and off > _SURE * spread + 0.5:
-                where = f"in {state_words(model, state)}, action {model.actions[action]} led"
+                where = f"in {model.index.words(state)}, action {model.actions[action]} led"
                 problem = (
-                    f"{where} to ({state_words(model, after)}) {seen[state, action, after]} times of {times}"
+                    f"{where} to ({model.index.words(after)}) {seen[state, action, after]} times of {times}"
                 )
                 raise ConformanceError(f"{problem}; the model's probability is {chance:g}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from worlds import Stream, TransitionModel
+from worlds import Stream
 
 _SAMPLED: Final = 200  # states that are looked at one by one
 
@@ -29,14 +29,3 @@ def sample(size: int) -> list[int]:
         return list(range(size))
     stream = Stream(size)
     return [stream.below(size) for _ in range(_SAMPLED)]
-
-
-def state_words(model: TransitionModel, number: int) -> str:
-    """Return a state's variables with their values.
-
-    >>> from worlds import load_layout, maze_model
-    >>> state_words(maze_model(load_layout("two_rooms")), 0)
-    'robot = 0,0, trigger = T1, goal = G1, doors = closed'
-    """
-    state = zip(model.index.variables, model.index.state(number), strict=True)
-    return ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in state)

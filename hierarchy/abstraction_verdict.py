@@ -106,14 +106,7 @@ def describe(index: StateIndex, state: int, names: Sequence[str] | None = None) 
     >>> describe(index, 3), describe(index, 3, ["door"])
     ('x = 1, door = open', 'door = open')
     """
-    values = index.state(state)
-    chosen = index.names if names is None else names
-    said = [
-        f"{variable.name} = {variable.label(value)}"
-        for variable, value in zip(index.variables, values, strict=True)
-        if variable.name in chosen
-    ]
-    return ", ".join(said) or "any state"
+    return index.words(state, names) or "any state"
 
 
 def as_numbers(mask: NDArray[np.bool_]) -> NDArray[np.float64]:

@@ -179,7 +179,4 @@ class _Check:
         return str(declared.until if (task.goal == task.terminal).all() else declared.goal)
 
     def _describe(self, mask: Mask) -> str:
-        index = self.grounded.model.index
-        state = index.state(int(np.flatnonzero(mask)[0]))
-        words = (f"{v.name} = {v.label(value)}" for v, value in zip(index.variables, state, strict=True))
-        return ", ".join(words)
+        return self.grounded.model.index.words(int(np.flatnonzero(mask)[0]))

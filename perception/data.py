@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import os
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -24,6 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from perception.pushed import COLUMNS, PushedFrames, pushed_frames
 from perception.variation import CLEAN, Variation
 from worlds import UserError
+from worlds.tensor_file import replace_file
 
 __all__ = [
     "CLEAN",
@@ -155,10 +155,10 @@ def make_data(
         for number in range(len(done), wanted.all_shards):
             data = _packed(pushed_frames(wanted.rows(number), seed, variation))
             file = f"shard-{number:06d}.npz"
-            _write(folder / file, data)
+            replace_file(folder / file, data)
             done.append(_Shard(file=file, sha256=hashlib.sha256(data).hexdigest()))
             text = wanted.model_copy(update={"shards": done}).model_dump_json(indent=1)
-            _write(folder / MANIFEST, text.encode())
+            replace_file(folder / MANIFEST, text.encode())
             if progress is not None:
                 progress(wanted.rows(number).stop)
     except OSError as error:
@@ -264,13 +264,3 @@ def _read_shard(path: Path, shard: _Shard, rows: int) -> dict[str, NDArray[np.ge
         if columns[name].dtype != np.dtype(dtype) or columns[name].shape != (rows, *shape):
             raise UserError(broken)
     return columns
-
-
-def _write(path: Path, data: bytes) -> None:
-    """Write a file whole or not at all, whenever the run is killed."""
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    with part.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    part.replace(path)

@@ -180,9 +180,7 @@ class BlackBoxMaxQ(MaxQ):
         if self._last is None or state != self._last.state:
             raise UserError("a black box can act only in the state it is in; call learn or greedy_episode")
         if self._last.terminated:
-            index = self._box.index
-            values = zip(index.variables, index.state(state), strict=True)
-            where = ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in values)
+            where = self._box.index.words(state)
             raise UserError(
                 f"the environment ended the episode in {where}, where a task still runs; "
                 "let the until of every task that may be running hold there"

@@ -164,9 +164,7 @@ class GapReport:
 
     def describe(self, state: int) -> str:
         """Return a state in words."""
-        index = self.grounded.model.index
-        pairs = zip(index.variables, index.state(state), strict=True)
-        return ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in pairs)
+        return self.grounded.model.index.words(state)
 
 
 def gap_report(grounded: GroundGraph, gamma: float = 1.0, states: Mask | None = None) -> GapReport:

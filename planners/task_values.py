@@ -59,9 +59,7 @@ class TaskValues(ABC):
         """Return what a task may call in a state, at least one child."""
         choices = self._available[task][state]
         if not choices:
-            index, name = self.grounded.model.index, self.grounded.nodes[task].name
-            values = zip(index.variables, index.state(state), strict=True)
-            where = ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in values)
+            name, where = self.grounded.nodes[task].name, self.grounded.model.index.words(state)
             raise UserError(
                 f"task {name} has no child to call in state {state} ({where}); start it where it runs, "
                 "and see what hierarchy.check says of the graph"

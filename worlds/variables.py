@@ -128,6 +128,21 @@ class StateIndex:
         positions = np.unravel_index(number, self.shape)
         return tuple(variable.values[int(i)] for variable, i in zip(self.variables, positions, strict=True))
 
+    def words(self, number: int, names: Sequence[str] | None = None) -> str:
+        """Return state `number` in words, or what the named variables say of it.
+
+        Examples
+        --------
+        >>> index = StateIndex((Variable("x", (0, 1)), Variable("door", ("shut", "open"))))
+        >>> index.words(3), index.words(3, ["door"])
+        ('x = 1, door = open', 'door = open')
+        """
+        return ", ".join(
+            f"{variable.name} = {variable.label(value)}"
+            for variable, value in zip(self.variables, self.state(number), strict=True)
+            if names is None or variable.name in names
+        )
+
     def __iter__(self) -> Iterator[tuple[Hashable, ...]]:
         return (self.state(number) for number in range(self.size))
 

@@ -12,6 +12,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, TypeAdapter, ValidationError
 
 from hierarchy.text_files import file_text
@@ -139,6 +141,19 @@ class OptionCriticConfig:
     def per_update(self) -> int:
         """Environment steps between two updates."""
         return self.num_envs * self.horizon
+
+    def left(self, steps: int) -> float:
+        """Return what is left of the annealing after so many steps, from 1 to 0."""
+        return max(0.0, 1 - steps / self.anneal)
+
+    def rate_with(self, left: float) -> float:
+        """Return the learning rate with so much of the annealing left."""
+        return self.last_rate + (self.rate - self.last_rate) * left
+
+    def scale(self, rewards: NDArray[np.float64]) -> float:
+        """Return about what an episode is worth in a world of some rewards, for critics to be scaled by."""
+        steps = 0.4 / (1 - min(self.gamma, 0.999))
+        return steps * float(np.abs(rewards).mean())
 
 
 _TYPES: Final = get_type_hints(OptionCriticConfig, include_extras=True)

@@ -87,8 +87,7 @@ class Flat(ABC):
             device=device,
         )
         self.world.set_seed(seed)
-        steps = 0.4 / (1 - min(config.gamma, 0.999))
-        self._scale = steps * float(np.abs(grounded.model.rewards).mean())  # as the option-critic's critic
+        self._scale = config.scale(grounded.model.rewards)
         with _drawing(seed, _FIRST):
             self._build(generator(seed, _FIRST))
         self.optimiser = torch.optim.Adam(self.loss.parameters(), lr=config.rate, eps=1e-5)
@@ -135,10 +134,10 @@ class Flat(ABC):
         batches = iter(collector)
         try:
             while self.steps < config.total:
-                left = max(0.0, 1 - self.steps / config.anneal)
+                left = config.left(self.steps)
                 self._anneal(left)
                 for group in self.optimiser.param_groups:
-                    group["lr"] = config.last_rate + (config.rate - config.last_rate) * left
+                    group["lr"] = config.rate_with(left)
                 with _drawing(self.seed, _ACT, self.updates):
                     batch = next(batches)
                 with _drawing(self.seed, _ORDER, self.updates):

@@ -124,9 +124,7 @@ class OptionCritic:
         sees = columns_of(encoding, options.task_uses, abstracted=config.abstracted)
         actor = Actor(options, sees, config.hidden, draw)
         sees = columns_of(encoding, [part.uses for part in options.parts], abstracted=config.abstracted)
-        steps = 0.4 / (1 - min(config.gamma, 0.999))
-        scale = steps * float(np.abs(self.grounded.model.rewards).mean())
-        critic = Critic(options, sees, config.hidden, scale, draw)
+        critic = Critic(options, sees, config.hidden, config.scale(self.grounded.model.rewards), draw)
         found = [
             TensorDictModule(actor, ["observation"], ["option_logits"]),
             TensorDictModule(critic, ["observation"], ["option_value"]),
@@ -227,11 +225,11 @@ class OptionCritic:
 
     def _schedule(self) -> None:
         config = self.config
-        left = max(0.0, 1 - self.steps / config.anneal)
+        left = config.left(self.steps)
         self.policy.epsilon = config.epsilon * left
         self.loss.entropy_coeff.fill_(config.entropy * left)
         for group in self.optimiser.param_groups:
-            group["lr"] = config.last_rate + (config.rate - config.last_rate) * left
+            group["lr"] = config.rate_with(left)
 
     def _update(self, batch: TensorDictBase) -> dict[str, float]:
         config, found = self.config, None
@@ -285,9 +283,7 @@ def _refuse_idle(options: Options, starts: NDArray[np.bool_]) -> None:
     """Refuse to begin in a state in which the root may call nothing."""
     idle = np.flatnonzero(starts & ~options.initiation[:, 0].any(axis=1))
     if idle.size:
-        index = options.grounded.model.index
-        values = zip(index.variables, index.state(int(idle[0])), strict=True)
-        where = ", ".join(f"{variable.name} = {variable.label(value)}" for variable, value in values)
+        where = options.grounded.model.index.words(int(idle[0]))
         raise UserError(
             f"{idle.size} of {int(starts.sum())} starts leave the root nothing to call, such as state "
             f"{idle[0]} ({where}); give starts from which a task can be called"
