@@ -285,6 +285,7 @@ def learn(
     ] = (),
     steps: int | None = None,
     tolerance: float = 0.0,
+    starts: str | None = None,
     resume: bool = False,
 ) -> int:
     """Learn a task graph on its world, held to the oracle, until every start's return is the best possible.
@@ -316,15 +317,18 @@ def learn(
     tolerance
         Learning also ends when it ends from every start and the mean return is so near the best possible,
         for worlds with chance, where learning cannot be exact.
+    starts
+        Begin only where this holds, a predicate such as "goal = 7,9"; the oracle asks for no more, either.
+        Defaults to all the world's starts.
     resume
         Go on from the checkpoint in the directory; give the rest of the command as before. Only --steps
         and --tolerance may change.
     """
-    from comparisons.learn_command import Spec, named_settings
-    from comparisons.learn_command import learn as run
+    from comparisons.learn.command import Spec, named_settings
+    from comparisons.learn.command import learn as run
 
     named = named_settings(settings, terminations)
-    spec = Spec(graph, out, learner, world, seed, config, named, steps, tolerance, resume)
+    spec = Spec(graph, out, learner, world, seed, config, named, steps, tolerance, starts, resume)
     outcome = run(spec, Console(stderr=True))
     print(outcome.text)
     return 0 if outcome.reached else 1

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
+from typing import Self
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -137,6 +140,12 @@ class TransitionModel:
         """Return the states that an action may lead to from the states of `mask`, sorted."""
         occurs = self.probabilities[mask, action] > 0
         return np.unique(self.outcomes[mask, action][occurs])
+
+    def beginning(self, starts: NDArray[np.bool_]) -> Self:
+        """Return the same world with other starts, shape (states,), bool."""
+        found = copy(self)
+        found.starts = starts
+        return found
 
     def reachable(self, starts: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
         """Return the states that some action sequence may reach from `starts`, shape (states,)."""

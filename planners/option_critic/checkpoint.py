@@ -45,6 +45,8 @@ class Checkpoint:
         The task graph's text.
     world
         The world's name.
+    starts
+        Predicate of the starts that episodes begin in; empty for all.
     seed
         Of learning.
     config
@@ -75,6 +77,7 @@ class Checkpoint:
     digest: Text
     steps: Annotated[int, Field(ge=0)]
     columns: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
+    starts: Annotated[str, Field(max_length=4096)] = ""
     sha256: str = ""
     versions: dict[str, str] = field(default_factory=lambda: {name: version(name) for name in _PACKAGES})
     created_by: str = field(default_factory=lambda: f"affordant {version('affordant')}")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Final
 
 from hierarchy.check import checked
+from hierarchy.starts import beginning_where
 from hierarchy.text import load_world, parse_graph
 from planners.option_critic.checkpoint import Checkpoint, load_checkpoint, restore
 from planners.option_critic.config import OptionCriticConfig
@@ -30,6 +31,8 @@ def load_option_critic(path: Path | str) -> OptionCritic:
         raise UserError(f"{path}: it is of the learner {about.learner!r}; give one of {OPTION_CRITIC!r}")
     world = load_world(about.world)
     grounded = checked(parse_graph(about.graph, f"{path}: its task graph", world).graph, world.model())
+    if about.starts:
+        grounded = beginning_where(grounded, about.starts)
     learner = OptionCritic(grounded, about.seed, _config(path, about))
     restore(path, stored, learner)
     return learner

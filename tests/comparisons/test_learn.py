@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from comparisons import learn_registry
 from comparisons.cli import main
-from comparisons.learn_line import Line, Measured
-from comparisons.learn_registry import Request, learner_names, new_run
-from comparisons.learn_tabular import TabularRun, greedy_tables
+from comparisons.learn import registry
+from comparisons.learn.line import Line, Measured
+from comparisons.learn.registry import Request, learner_names, new_run
+from comparisons.learn.tabular import TabularRun, greedy_tables
 from hierarchy import ground
 from hierarchy.check import checked
 from hierarchy.text import load_graph, load_world
@@ -309,11 +309,11 @@ def test_when_learning_may_stop(measured: Measured, tolerance: float, enough: bo
 def test_a_package_can_add_a_learner(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its entry point is offered; ours cannot be taken, and a broken one says so."""
     points = [
-        EntryPoint("mine", "comparisons.learn_tabular:maxq_0", learn_registry.GROUP),
-        EntryPoint("maxq-0", "nowhere:none", learn_registry.GROUP),
-        EntryPoint("broken", "nowhere:none", learn_registry.GROUP),
+        EntryPoint("mine", "comparisons.learn.tabular:maxq_0", registry.GROUP),
+        EntryPoint("maxq-0", "nowhere:none", registry.GROUP),
+        EntryPoint("broken", "nowhere:none", registry.GROUP),
     ]
-    monkeypatch.setattr(learn_registry, "entry_points", lambda **_: points)
+    monkeypatch.setattr(registry, "entry_points", lambda **_: points)
     assert learner_names() == ("option-critic", "maxq-0", "flat-q", "broken", "mine")
     graph, world = load_graph("taxi")
     grounded = ground(graph, world.model())
@@ -330,7 +330,7 @@ def test_a_killed_run_that_goes_on_ends_like_an_unbroken_one(
     """SIGKILL at any time costs what was learnt since the last checkpoint, and changes nothing else."""
     tokens = ("two_rooms", "--world", "small.maze", *QUICK, "entropy=1", "--steps", "10240", "--out")
     ended, *_ = run(capsys, *tokens, "whole")
-    code = "import comparisons.learn_command as c; c.EVERY = 0.0; from comparisons.cli import main; main()"
+    code = "import comparisons.learn.command as c; c.EVERY = 0.0; from comparisons.cli import main; main()"
     killed = subprocess.Popen(  # noqa: S603 - our own code
         [sys.executable, "-c", code, "learn", *tokens, "broken"],
         cwd=here,

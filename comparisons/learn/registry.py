@@ -28,9 +28,9 @@ GROUP: Final = "affordant.learners"
 """The entry points' group."""
 # Reached by name, so that only the learner that is asked for loads its libraries.
 _OURS: Final = {
-    "option-critic": "comparisons.learn_neural:option_critic",
-    "maxq-0": "comparisons.learn_tabular:maxq_0",
-    "flat-q": "comparisons.learn_tabular:flat_q",
+    "option-critic": "comparisons.learn.neural:option_critic",
+    "maxq-0": "comparisons.learn.tabular:maxq_0",
+    "flat-q": "comparisons.learn.tabular:flat_q",
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from comparisons.learn_registry import Pieces, Request
+from comparisons.learn.registry import Pieces, Request
 from hierarchy import GroundGraph
 from planners.option_critic.config import load_config
 from planners.option_critic.greedy import GreedyPolicy

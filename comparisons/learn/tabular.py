@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.learn_registry import Pieces, Request
+from comparisons.learn.registry import Pieces, Request
 from planners import EpisodeTooLongError, Exploration, HarmonicRate, Learner, LearningRate, Settings
 from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ
 from planners.compiled.resuming import restore, state_of

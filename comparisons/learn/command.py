@@ -16,11 +16,13 @@ import numpy as np
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from comparisons.learn_line import Line, Measured
-from comparisons.learn_registry import Request, Run, new_run
-from comparisons.learn_stopping import told_to_stop
+from comparisons.learn.line import Line, Measured
+from comparisons.learn.registry import Request, Run, new_run
+from comparisons.learn.stopping import told_to_stop
 from comparisons.outputs import refuse_existing
+from hierarchy import GroundGraph
 from hierarchy.check import checked
+from hierarchy.starts import beginning_where
 from hierarchy.text import graph_text, load_graph, load_world
 from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
 from worlds.errors import UserError
@@ -46,6 +48,7 @@ class Spec:
     settings: Mapping[str, str] = field(default_factory=dict)
     steps: int | None = None
     tolerance: float = 0.0
+    starts: str | None = None
     resume: bool = False
 
 
@@ -100,10 +103,19 @@ def learn(spec: Spec, console: Console) -> Outcome:
         refuse_existing(spec.out)
     graph, world = load_graph(spec.graph, None if spec.world is None else load_world(spec.world))
     grounded = checked(graph, world.model())
+    if spec.starts is not None:
+        grounded = _beginning_where(grounded, spec.starts)
     line = Line.of(grounded)
     run = new_run(Request(spec.learner, grounded, spec.seed, spec.config, dict(spec.settings), spec.steps))
     about = Checkpoint(
-        spec.learner, graph_text(graph, world), world.name, spec.seed, dict(run.settings), digest(grounded), 0
+        spec.learner,
+        graph_text(graph, world),
+        world.name,
+        spec.seed,
+        dict(run.settings),
+        digest(grounded),
+        steps=0,
+        starts=spec.starts or "",
     )
     session = _Session(spec, run, line, about)
     if spec.resume:
@@ -193,6 +205,7 @@ class _Session:
             words += ["--terminations", text] if name == "terminations" else ["--set", f"{name}={text}"]
         words += ["--steps", str(spec.steps)] if spec.steps is not None else []
         words += ["--tolerance", f"{spec.tolerance:g}"] if spec.tolerance else []
+        words += ["--starts", spec.starts] if spec.starts is not None else []
         return shlex.join([*words, "--out", str(spec.out), "--resume"])
 
     def outcome(self) -> Outcome:
@@ -213,6 +226,13 @@ class _Session:
         return Outcome("\n".join(text), last.enough(spec.tolerance))
 
 
+def _beginning_where(grounded: GroundGraph, starts: str) -> GroundGraph:
+    try:
+        return beginning_where(grounded, starts)
+    except UserError as error:
+        raise UserError(f"--starts: {error}") from error
+
+
 def _refuse_astray(steps: int, measures: Mapping[str, float]) -> None:
     """Refuse to go on, and to keep, what has no finite numbers any more."""
     for name, value in measures.items():
@@ -229,6 +249,7 @@ def _refuse_other(path: Path, was: Checkpoint, now: Checkpoint) -> None:
         "--learner": (was.learner, now.learner),
         "--seed": (was.seed, now.seed),
         "--world": (was.world, now.world),
+        "--starts": (was.starts or "all", now.starts or "all"),
     }
     for name in now.config:
         if name != "total":
