@@ -20,6 +20,7 @@ _LOOKS: Final = {
     "learnt, no prior": (PLUM, "-."),
     "flat PPO": (VERMILION, "--"),
     "flat DQN": (GREY, ":"),
+    "tabular option-critic (as published)": (SKY, "-."),
     "4 pairs, abstracted": (BLUE, "-"),
     "4 pairs, full": (ORANGE, "-."),
     "4 pairs, flat PPO": (VERMILION, "--"),
@@ -32,7 +33,7 @@ def curves_figure(learners: Rows) -> Figure:
 
     Left those that learn from all starts, right the unseen pairs of those that learn from four pairs.
     """
-    figure = Figure((7.2, 2.9), layout="constrained")
+    figure = Figure((7.2, 3.3), layout="constrained")
     left, right = figure.subplots(1, 2, sharey=True)
     for axes, four, title in ((left, False, "all 512 cases"), (right, True, "12 pairs never trained on")):
         axes.set_title(panel(int(four), title), loc="left")
@@ -40,7 +41,7 @@ def curves_figure(learners: Rows) -> Figure:
         for name, rows in learners.items():
             if rows[0]["four"] == four:
                 _band(axes, name, [[(step, *shares) for step, _, *shares in row["curve"]] for row in rows])
-        axes.legend(loc="upper left", bbox_to_anchor=(0.65, 0.6) if four else (0.36, 0.95))
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.2), ncols=3)
         axes.set_xlim(left=0)
     left.set_ylabel("cases with an optimal greedy route (%)")
     left.set_ylim(-2, 102)
@@ -57,7 +58,13 @@ def _band(axes: Axes, name: str, curves: list[list[tuple[float, ...]]]) -> None:
         shares[i, 1 : len(curve) + 1] = [100 * row[column] for row in curve]
         shares[i, len(curve) + 1 :] = 100 * curve[-1][column]
     colour, line = _LOOKS[name]
-    axes.plot(steps, np.median(shares, axis=0), line, color=colour, label=name.removeprefix("4 pairs, "))
+    axes.plot(
+        steps,
+        np.median(shares, axis=0),
+        line,
+        color=colour,
+        label=name.removeprefix("4 pairs, ").partition(" (")[0],
+    )
     axes.fill_between(steps, shares.min(0), shares.max(0), color=colour, alpha=0.15, linewidth=0)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
@@ -286,6 +288,9 @@ def learn(
     steps: int | None = None,
     tolerance: float = 0.0,
     starts: str | None = None,
+    carry: Path | None = None,
+    moved: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative_iterable=())] = (),
+    logger: str | None = None,
     resume: bool = False,
 ) -> int:
     """Learn a task graph on its world, held to the oracle, until every start's return is the best possible.
@@ -300,14 +305,15 @@ def learn(
     out
         Directory to make, for checkpoint.safetensors, its card as JSON, and the learning curve, curve.csv.
     learner
-        Learner: option-critic, maxq-0, flat-q, or one that an installed package adds.
+        Learner: option-critic; flat-ppo or flat-dqn, which know no tasks (setting hidden is 128 unless
+        given); maxq-0 or flat-q, which keep tables; or one that an installed package adds.
     world
         World to learn on: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one that
         the graph names.
     seed
         Of learning: the same seed and settings give the same curve and checkpoint on one machine.
     config
-        YAML file of the option-critic's settings, those that differ from option_critic.yaml.
+        YAML file of the network learners' settings, those that differ from option_critic.yaml.
     terminations
         What ends a task: given (the graph), learnt, or prior (learnt, with the graph as a prior).
     settings
@@ -320,15 +326,23 @@ def learn(
     starts
         Begin only where this holds, a predicate such as "goal = 7,9"; the oracle asks for no more, either.
         Defaults to all the world's starts.
+    carry
+        Begin with the networks of this checkpoint of an option-critic that do not see what has moved.
+    moved
+        State variables that have moved since, such as --moved goal.
+    logger
+        Keep the learning curve in the directory's log, too, by a logger of TorchRL's: csv, tensorboard,
+        wandb or mlflow.
     resume
         Go on from the checkpoint in the directory; give the rest of the command as before. Only --steps
-        and --tolerance may change.
+        and --tolerance may change, and --carry may be left out; so may --logger.
     """
-    from comparisons.learn.command import Spec, named_settings
     from comparisons.learn.command import learn as run
+    from comparisons.learn.spec import Spec, named_settings
 
     named = named_settings(settings, terminations)
-    spec = Spec(graph, out, learner, world, seed, config, named, steps, tolerance, starts, resume)
+    asked = (graph, out, learner, world, seed, config, named, steps, tolerance, starts, resume)
+    spec = Spec(*asked, carry, moved, logger)
     outcome = run(spec, Console(stderr=True))
     print(outcome.text)
     return 0 if outcome.reached else 1
@@ -342,10 +356,14 @@ def main(tokens: Sequence[str] | None = None) -> None:
     try:
         with orderly_exit():
             status = app(tokens, exit_on_error=False, print_error=False, result_action="return_value")
+            sys.stdout.flush()
     except (CycloptsError, UserError) as error:
         print(f"affordant: {error}", file=sys.stderr)
         sys.exit(2)
     except KeyboardInterrupt:
         print("affordant: stopped", file=sys.stderr)
         sys.exit(130)
+    except BrokenPipeError:  # whoever read the output, such as head, has had enough of it
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # for what is flushed at the end
+        sys.exit(128 + signal.SIGPIPE)
     sys.exit(status or 0)

@@ -14,11 +14,12 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from worlds import UserError
 from worlds.tensor_file import (
     MOST_BYTES,
+    Cards,
     Tensors,
     named,
     read_bytes,
@@ -31,7 +32,7 @@ __all__ = ["FORMAT", "MOST_BYTES", "Card", "Share", "Tensors", "installed", "loa
 
 FORMAT: Final = 1
 """The version of the card's form that is written and read."""
-_MOST_CARD: Final = 1 << 16  # bytes
+_MOST_CARD: Final = 1 << 16  # characters, or bytes of the copy
 _MISSING: Final = "check the path, or train the backend first"
 Share = Annotated[float, Field(ge=0, le=1)]
 
@@ -83,7 +84,13 @@ class Card:
     format: int = FORMAT
 
 
-_CARDS: Final = TypeAdapter(Card)
+_CARDS: Final = Cards(
+    TypeAdapter(Card),
+    FORMAT,
+    _MOST_CARD,
+    missing="the weights have no card; save them by perception.models.save_model",
+    mend="save it anew",
+)
 
 
 def save_model(path: Path | str, tensors: Mapping[str, NDArray[Any]], card: Card) -> None:
@@ -121,7 +128,7 @@ def save_model(path: Path | str, tensors: Mapping[str, NDArray[Any]], card: Card
         raise UserError(
             f"{path}: the card cannot be written ({error}); use plain numbers and words"
         ) from error
-    _read_card(text, path)
+    _CARDS.read(text, path)
     content = tensor_bytes(path, tensors, {"card": text})
     replace_files({path: content, path.with_suffix(".json"): f"{text}\n".encode()})
 
@@ -148,7 +155,7 @@ def load_model(
     """
     path = named(path)
     tensors, words = read_tensors(path, _MISSING, MOST_BYTES)
-    card = _read_card(words.get("card"), path)
+    card = _CARDS.read(words.get("card"), path)
     _agrees(path, card)
     if backend is not None and card.backend != backend:
         raise UserError(f"{path}: the weights are for backend {card.backend!r}, not {backend!r}; name others")
@@ -172,31 +179,13 @@ def installed(*packages: str) -> dict[str, str]:
     return {package: version(package) for package in packages}
 
 
-def _read_card(text: str | None, source: Path | str) -> Card:
-    if text is None:
-        raise UserError(f"{source}: the weights have no card; save them by perception.models.save_model")
-    if len(text) > _MOST_CARD:
-        raise UserError(f"{source}: the card has more than {_MOST_CARD} characters; shorten it")
-    try:
-        card = _CARDS.validate_json(text)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the whole"
-        raise UserError(f"{source}: the card is wrong at {where}: {first['msg']}; save it anew") from error
-    if card.format != FORMAT:
-        raise UserError(
-            f"{source}: the card is of format {card.format}; this affordant reads {FORMAT}: update it"
-        )
-    return card
-
-
 def _agrees(path: Path, card: Card) -> None:
     """Refuse a readable card that says something else than the one that counts."""
     beside = path.with_suffix(".json")
     if not beside.exists():
         return
     try:
-        copy = _read_card(read_bytes(beside, _MOST_CARD, _MISSING).decode(), beside)
+        copy = _CARDS.read(read_bytes(beside, _MOST_CARD, _MISSING).decode(), beside)
     except UnicodeDecodeError as error:
         raise UserError(f"{beside}: this is no UTF-8 text; delete it, the weights hold their card") from error
     if copy != card:

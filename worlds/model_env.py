@@ -89,9 +89,10 @@ class ModelTorchEnv(EnvBase):  # type: ignore[misc]  # TorchRL has no types
             raise UserError("an episode needs a state to begin in that is not terminal; give other starts")
         self.encoding = Encoding(model.index, self.device) if encoding is None else encoding
         self._starts = torch.tensor(chosen, device=self.device)
-        self._terminal = torch.tensor(terminal, device=self.device)
+        # Tables are read by index_select, quicker than brackets, and as columns, which is what TorchRL wants.
+        self._terminal = torch.tensor(terminal, device=self.device)[:, None]
         self._after, self._rewards, self._upper = _tables(model, self.device)
-        self._outcomes = self._after.shape[1]
+        self._outcomes = model.outcomes.shape[2]
         zeros = torch.zeros(number, dtype=torch.int64, device=self.device)
         self.state, self.steps, self.episodes = zeros.clone(), zeros.clone(), zeros.clone()
         self._keys, self._episode_keys = zeros.clone(), zeros.clone()
@@ -151,7 +152,7 @@ class ModelTorchEnv(EnvBase):  # type: ignore[misc]  # TorchRL has no types
         chosen = None if tensordict is None else tensordict.get("_reset", None)
         if chosen is None and self._resumed:
             self._resumed = False
-            return self._seen({})
+            return self._begun()
         keys = bits(self._keys + self.episodes, 1)
         start = self._starts[below(keys, _START, len(self._starts))]
         if chosen is None:
@@ -163,7 +164,7 @@ class ModelTorchEnv(EnvBase):  # type: ignore[misc]  # TorchRL has no types
             self.steps = torch.where(here, 0, self.steps)
             self._episode_keys = torch.where(here, keys, self._episode_keys)
             self.episodes = self.episodes + here
-        return self._seen({})
+        return self._begun()
 
     def _step(self, tensordict: TensorDictBase) -> TensorDictBase:
         """Carry out ``"action"``; with ``"_step"``, only in the environments that it names."""
@@ -182,31 +183,35 @@ class ModelTorchEnv(EnvBase):  # type: ignore[misc]  # TorchRL has no types
         action = tensordict.get("action")
         if action.device.type == "cpu":
             self._check(action)
-        row = self.state * len(self.model.actions) + action
+        row = torch.add(action, self.state, alpha=len(self.model.actions))
         self.steps = self.steps + 1
-        if self._outcomes == 1:
-            self.state, rewards = self._after[row, 0], self._rewards[row, 0]
-        else:
+        if self._outcomes > 1:
             draw = fractions(self._episode_keys, self.steps + _START)
-            which = (self._upper[row] <= draw[:, None]).sum(1)
-            self.state, rewards = self._after[row, which], self._rewards[row, which]
-        terminated = self._terminal[self.state][:, None]
-        truncated = (self.steps >= self.max_steps)[:, None] & ~terminated
+            which = (self._upper.index_select(0, row) <= draw[:, None]).sum(1)
+            row = torch.add(which, row, alpha=self._outcomes)
+        self.state = self._after.index_select(0, row)
+        terminated = self._terminal.index_select(0, self.state)
+        late = (self.steps >= self.max_steps)[:, None]
         return self._seen(
             {
-                "reward": rewards[:, None],
+                "reward": self._rewards.index_select(0, row),
                 "terminated": terminated,
-                "truncated": truncated,
-                "done": terminated | truncated,
+                "truncated": late > terminated,  # and not terminated
+                "done": late | terminated,
             }
         )
 
     def _check(self, action: Tensor) -> None:
-        wrong = (action < 0) | (action >= len(self.model.actions))
-        if wrong.any():
-            i = int(wrong.nonzero()[0, 0])
+        least, most = torch.aminmax(action)
+        if least < 0 or most >= len(self.model.actions):
+            i = int(((action < 0) | (action >= len(self.model.actions))).nonzero()[0, 0])
             problem = f"action {int(action[i])} of environment {i} is not possible"
             raise UserError(f"{problem}; give 0 to {len(self.model.actions) - 1}")
+
+    def _begun(self) -> TensorDictBase:
+        # TorchRL would make these from their specs, which takes it longer.
+        flags = ("done", "terminated", "truncated")
+        return self._seen({name: self._terminal.new_zeros(self.number, 1) for name in flags})
 
     def _seen(self, more: dict[str, Tensor]) -> TensorDictBase:
         found = {"state": self.state, "observation": self.encoding(self.state), **more}
@@ -214,9 +219,10 @@ class ModelTorchEnv(EnvBase):  # type: ignore[misc]  # TorchRL has no types
 
 
 def _tables(model: TransitionModel, device: torch.device) -> tuple[Tensor, Tensor, Tensor]:
-    """Return next states, rewards, and the draws below which outcomes occur; a row a state and action.
+    """Return next states and rewards, a row an outcome, and the draws below which outcomes occur.
 
-    Draws are whole numbers below 2**53, for not every device knows 64-bit floats.
+    Of shapes (rows * outcomes,), (rows * outcomes, 1) and (rows, outcomes), where the rows are states times
+    actions. Draws are whole numbers below 2**53, for not every device knows 64-bit floats.
     """
     shape = (-1, model.outcomes.shape[2])
     chances = model.probabilities.reshape(shape)
@@ -224,6 +230,7 @@ def _tables(model: TransitionModel, device: torch.device) -> tuple[Tensor, Tenso
     outcomes = shape[1]
     last = outcomes - 1 - np.argmax(chances[:, ::-1] > 0, axis=1)  # of rounding, the last that can occur
     upper[np.arange(outcomes) >= last[:, None]] = 1 << 53
-    arrays = (model.outcomes.reshape(shape), model.outcome_rewards.reshape(shape).astype(np.float32), upper)
+    rewards_of = model.outcome_rewards.reshape(-1, 1).astype(np.float32)
+    arrays = (model.outcomes.reshape(-1), rewards_of, upper)
     after, rewards, draws = (torch.tensor(array, device=device) for array in arrays)  # its own, not views
     return after, rewards, draws

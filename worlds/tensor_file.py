@@ -1,7 +1,7 @@
 """Arrays on disk as safetensors, with words in the header: written whole or not at all, read with care.
 
-Such a file holds numbers and text, nothing that is ever executed. `perception.models` and
-`planners.option_critic.checkpoint` say what the words are.
+Such a file holds numbers and text, nothing that is ever executed. A card among the words tells what it is of:
+`perception.models` and `planners.option_critic.checkpoint` say what stands on theirs.
 """
 
 from __future__ import annotations
@@ -10,11 +10,13 @@ import json
 import os
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import TypeAdapter, ValidationError
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
@@ -35,6 +37,85 @@ class TensorFile(NamedTuple):
 
     tensors: Tensors
     words: dict[str, str]
+
+
+class Formatted(Protocol):
+    """A card: it tells the version of its form."""
+
+    @property
+    def format(self) -> int:
+        """Version of the form."""
+
+
+C = TypeVar("C", bound=Formatted)
+
+
+@dataclass(frozen=True)
+class Cards(Generic[C]):
+    """Reads the cards of one kind of file.
+
+    Parameters
+    ----------
+    adapter
+        Of the card's class.
+    format
+        The version of the form that is read.
+    most
+        Characters that a card may have.
+    missing
+        What a file without a card is, and what to do about it.
+    mend
+        What to do about a card that is wrong.
+
+    Examples
+    --------
+    >>> @dataclass(frozen=True)
+    ... class Card:
+    ...     format: int
+    >>> cards = Cards(TypeAdapter(Card), 1, 100, "there is no card; write one", "write it anew")
+    >>> cards.read('{"format": 1}', "m.safetensors")
+    Card(format=1)
+    >>> cards.read('{}', "m.safetensors")
+    Traceback (most recent call last):
+        ...
+    worlds.errors.UserError: m.safetensors: the card is wrong at format: Field required; write it anew
+    """
+
+    adapter: TypeAdapter[C]
+    format: int
+    most: int
+    missing: str
+    mend: str
+
+    def read(self, text: str | None, source: Path | str) -> C:
+        """Return a card from its JSON.
+
+        Parameters
+        ----------
+        text
+            The JSON; None if there is none.
+        source
+            Where it is from, for messages.
+
+        Raises
+        ------
+        UserError
+            If there is no card, it is too long, a field of it is wrong, or it is of another format.
+        """
+        if text is None:
+            raise UserError(f"{source}: {self.missing}")
+        if len(text) > self.most:
+            raise UserError(f"{source}: the card has more than {self.most} characters; {self.mend}")
+        try:
+            card = self.adapter.validate_json(text)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(str(part) for part in first["loc"]) or "the whole"
+            raise UserError(f"{source}: the card is wrong at {where}: {first['msg']}; {self.mend}") from error
+        if card.format != self.format:
+            other = f"the card is of format {card.format}"
+            raise UserError(f"{source}: {other}; this affordant reads {self.format}: update it")
+        return card
 
 
 def tensor_bytes(path: Path, tensors: Mapping[str, NDArray[Any]], words: Mapping[str, str]) -> bytes:

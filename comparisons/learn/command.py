@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
-import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
@@ -17,7 +16,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from comparisons.learn.line import Line, Measured
-from comparisons.learn.registry import Request, Run, new_run
+from comparisons.learn.logging_to import Log, logging_to
+from comparisons.learn.registry import Carry, Request, Run, new_run
+from comparisons.learn.spec import Spec
 from comparisons.learn.stopping import told_to_stop
 from comparisons.outputs import refuse_existing
 from hierarchy import GroundGraph
@@ -33,47 +34,6 @@ CURVE: Final = "curve.csv"
 EVERY: Final = 20.0
 """Seconds between two checkpoints."""
 _FIXED: Final = ("steps", "share_optimal", "share_ending", "mean_return", "mean_loss")
-
-
-@dataclass(frozen=True)
-class Spec:
-    """What `affordant learn` was asked for; see `comparisons.cli.learn`."""
-
-    graph: str
-    out: Path
-    learner: str = "option-critic"
-    world: str | None = None
-    seed: int = 0
-    config: Path | None = None
-    settings: Mapping[str, str] = field(default_factory=dict)
-    steps: int | None = None
-    tolerance: float = 0.0
-    starts: str | None = None
-    resume: bool = False
-
-
-def named_settings(pairs: tuple[str, ...], terminations: str | None = None) -> dict[str, str]:
-    """Return settings by name from what stands on a command line.
-
-    Raises
-    ------
-    UserError
-        If one has no name, or one is given twice.
-
-    Examples
-    --------
-    >>> named_settings(("rate=1e-3", "gamma=0.9"), "prior")
-    {'terminations': 'prior', 'rate': '1e-3', 'gamma': '0.9'}
-    """
-    found = {} if terminations is None else {"terminations": terminations}
-    for pair in pairs:
-        name, equals, value = pair.partition("=")
-        if not equals:
-            raise UserError(f"--set {pair}: there is no '='; write NAME=VALUE, such as rate=1e-3")
-        if name in found:
-            raise UserError(f"--set {pair}: {name} is given already; give it once")
-        found[name] = value
-    return found
 
 
 class Outcome(NamedTuple):
@@ -93,12 +53,6 @@ def learn(spec: Spec, console: Console) -> Outcome:
     KeyboardInterrupt, SystemExit
         If it was told to stop; then what was learnt has been saved.
     """
-    if not 0 <= spec.seed < 1 << 63:
-        raise UserError(f"--seed {spec.seed}: give a whole number from 0 to 9223372036854775807")
-    if not 0 <= spec.tolerance < float("inf"):
-        raise UserError(f"--tolerance {spec.tolerance}: give a number from 0 on")
-    if spec.steps is not None and spec.steps < 1:
-        raise UserError(f"--steps {spec.steps}: give at least 1")
     if not spec.resume:
         refuse_existing(spec.out)
     graph, world = load_graph(spec.graph, None if spec.world is None else load_world(spec.world))
@@ -106,7 +60,9 @@ def learn(spec: Spec, console: Console) -> Outcome:
     if spec.starts is not None:
         grounded = _beginning_where(grounded, spec.starts)
     line = Line.of(grounded)
-    run = new_run(Request(spec.learner, grounded, spec.seed, spec.config, dict(spec.settings), spec.steps))
+    asked = Request(spec.learner, grounded, spec.seed, spec.config, dict(spec.settings), spec.steps)
+    # A run that goes on has all its networks in its own checkpoint.
+    run = new_run(asked if spec.resume else replace(asked, carry=_carry(spec, console)))
     about = Checkpoint(
         spec.learner,
         graph_text(graph, world),
@@ -116,12 +72,14 @@ def learn(spec: Spec, console: Console) -> Outcome:
         digest(grounded),
         steps=0,
         starts=spec.starts or "",
+        carried=_identity(spec),
     )
     session = _Session(spec, run, line, about)
     if spec.resume:
         session.take_up(console)
     if not session.over():
-        with _folder(spec.out):
+        so_far = session.columns, session.rows
+        with _folder(spec.out), logging_to(spec.logger, spec.out, *so_far) as session.log:
             session.learn(console)
     return session.outcome()
 
@@ -135,6 +93,7 @@ class _Session:
         self.steps, self.total = 0, int(run.settings["total"])
         self.columns: tuple[str, ...] = _FIXED
         self.rows: list[tuple[float, ...]] = []
+        self.log = Log()
 
     @property
     def last(self) -> Measured | None:
@@ -156,6 +115,7 @@ class _Session:
         for name, was in stored.about.versions.items():
             if was != (now := self.about.versions.get(name)):
                 console.print(f"note: it was begun with {name} {was}, this is {now}; bits may differ")
+        self.about = replace(self.about, carried=stored.about.carried)
         self.steps, self.columns = stored.about.steps, stored.about.columns
         self.rows = [tuple(row) for row in stored.curve.tolist()]
 
@@ -176,7 +136,7 @@ class _Session:
                     saved = time.monotonic()
             self.save()
         if told and not self.over():
-            going_on = f"stopped after {self.steps} steps; to go on: {self.command()}"
+            going_on = f"stopped after {self.steps} steps; to go on: {self.spec.going_on()}"
             console.print(going_on, soft_wrap=True, markup=False, highlight=False)
             told.obey()
 
@@ -186,6 +146,7 @@ class _Session:
             self.columns = (*_FIXED, *measures)
         others = (float(measures.get(name, float("nan"))) for name in self.columns[len(_FIXED) :])
         self.rows.append((float(self.steps), *self.line.measure(self.run.greedy()), *others))
+        self.log.add(self.columns, self.rows[-1])
 
     def save(self) -> None:
         """Write checkpoint and curve."""
@@ -193,20 +154,6 @@ class _Session:
         about = replace(self.about, steps=self.steps, columns=self.columns)
         save_checkpoint(self.path, about, self.run.state(), curve)
         replace_files({self.spec.out / CURVE: _csv(self.columns, self.rows).encode()})
-
-    def command(self) -> str:
-        """Return the command that goes on."""
-        spec = self.spec
-        words = ["affordant", "learn", spec.graph, "--learner", spec.learner]
-        words += ["--world", spec.world] if spec.world is not None else []
-        words += ["--seed", str(spec.seed)] if spec.seed else []
-        words += ["--config", str(spec.config)] if spec.config is not None else []
-        for name, text in spec.settings.items():
-            words += ["--terminations", text] if name == "terminations" else ["--set", f"{name}={text}"]
-        words += ["--steps", str(spec.steps)] if spec.steps is not None else []
-        words += ["--tolerance", f"{spec.tolerance:g}"] if spec.tolerance else []
-        words += ["--starts", spec.starts] if spec.starts is not None else []
-        return shlex.join([*words, "--out", str(spec.out), "--resume"])
 
     def outcome(self) -> Outcome:
         """Return the summary."""
@@ -233,6 +180,24 @@ def _beginning_where(grounded: GroundGraph, starts: str) -> GroundGraph:
         raise UserError(f"--starts: {error}") from error
 
 
+def _carry(spec: Spec, console: Console) -> Carry | None:
+    """Return what is to be carried over; what was is told on the console."""
+
+    def tell(names: tuple[str, ...]) -> None:
+        words = f"carried over from {spec.carry}: {', '.join(names)}"
+        console.print(words, soft_wrap=True, markup=False, highlight=False)
+
+    return None if spec.carry is None else Carry(spec.carry, spec.moved, tell)
+
+
+def _identity(spec: Spec) -> str:
+    """Return what is carried over, told from anything else that could be; empty for nothing."""
+    if spec.carry is None:
+        return ""
+    arrays = load_checkpoint(spec.carry).about.sha256
+    return f"{arrays[:16]} without {', '.join(sorted(set(spec.moved)))}"
+
+
 def _refuse_astray(steps: int, measures: Mapping[str, float]) -> None:
     """Refuse to go on, and to keep, what has no finite numbers any more."""
     for name, value in measures.items():
@@ -251,6 +216,8 @@ def _refuse_other(path: Path, was: Checkpoint, now: Checkpoint) -> None:
         "--world": (was.world, now.world),
         "--starts": (was.starts or "all", now.starts or "all"),
     }
+    if now.carried:  # it may be left out
+        pairs["--carry"] = (was.carried or "nothing", now.carried)
     for name in now.config:
         if name != "total":
             pairs[f"setting {name}"] = (was.config.get(name), now.config[name])

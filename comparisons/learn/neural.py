@@ -1,9 +1,13 @@
-"""The option-critic as a run of `affordant learn`. Importing this module loads PyTorch and TorchRL."""
+"""The option-critic and its flat rivals as runs of `affordant learn`.
+
+Importing this module loads PyTorch and TorchRL.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -11,15 +15,21 @@ from numpy.typing import NDArray
 
 from comparisons.learn.registry import Pieces, Request
 from hierarchy import GroundGraph
-from planners.option_critic.config import load_config
+from hierarchy.text_files import file_text
+from hierarchy.text_nodes import TaskGraphTextError, read_yaml
+from planners.option_critic.collecting import CollectingLearner
+from planners.option_critic.config import OptionCriticConfig, load_config
+from planners.option_critic.flat_baselines import WIDTH, Flat, FlatDQN, FlatPPO
 from planners.option_critic.greedy import GreedyPolicy
 from planners.option_critic.training import OptionCritic
+from planners.option_critic.transfer import carry_from
+from worlds.errors import UserError
 
 
 class NeuralRun:
-    """A run of an option-critic."""
+    """A run of a learner that collects and has networks."""
 
-    def __init__(self, learner: OptionCritic) -> None:
+    def __init__(self, learner: CollectingLearner) -> None:
         self.learner = learner
 
     @property
@@ -29,8 +39,9 @@ class NeuralRun:
 
     @property
     def settings(self) -> Mapping[str, bool | int | float | str]:
-        """The config, by name."""
-        return asdict(self.learner.config)
+        """The config, by name, but for what the learner does not read."""
+        config = asdict(self.learner.config)
+        return {name: value for name, value in config.items() if name not in self.learner.unread}
 
     def learn(self) -> Pieces:
         """Learn, update by update."""
@@ -45,7 +56,7 @@ class NeuralRun:
         return self.learner.greedy()
 
     def state(self) -> Mapping[str, NDArray[np.generic]]:
-        """Return networks, moments and environments."""
+        """Return networks, moments and environments, and what else is kept."""
         return self.learner.state()
 
     def restore(self, state: Mapping[str, NDArray[np.generic]], /) -> None:
@@ -55,8 +66,53 @@ class NeuralRun:
 
 def option_critic(request: Request) -> NeuralRun:
     """Return a run of an option-critic on one thread, for the order of sums is part of what is repeated."""
-    config = load_config(request.config, request.settings)
-    if request.steps is not None:
-        config = replace(config, total=request.steps)
     torch.set_num_threads(1)
-    return NeuralRun(OptionCritic(request.grounded, request.seed, config))
+    learner = OptionCritic(request.grounded, request.seed, _config(request))
+    if (carry := request.carry) is not None:
+        carry.tell(carry_from(carry.path, learner, carry.moved))
+    return NeuralRun(learner)
+
+
+def flat_ppo(request: Request) -> NeuralRun:
+    """Return a run of flat PPO on one thread."""
+    return _flat(FlatPPO, request)
+
+
+def flat_dqn(request: Request) -> NeuralRun:
+    """Return a run of flat DQN on one thread."""
+    return _flat(FlatDQN, request)
+
+
+def _flat(kind: type[Flat], request: Request) -> NeuralRun:
+    """Return a run of a flat learner, its network wide unless its width is given.
+
+    In a file, which may be meant for several learners, settings that it does not read are let be.
+    """
+    for name in request.settings:
+        if name in kind.unread:
+            given = "--terminations" if name == "terminations" else f"--set {name}"
+            read = [field.name for field in fields(OptionCriticConfig) if field.name not in kind.unread]
+            raise UserError(
+                f"{given}: the learner {request.learner} has no use for {name}; leave it out. "
+                f"Its settings are {', '.join(read)}"
+            )
+    config = _config(request)
+    if "hidden" not in request.settings and not _sets(request.config, "hidden"):
+        config = replace(config, hidden=WIDTH)
+    torch.set_num_threads(1)
+    return NeuralRun(kind(request.grounded, request.seed, config))
+
+
+def _config(request: Request) -> OptionCriticConfig:
+    config = load_config(request.config, request.settings)
+    return config if request.steps is None else replace(config, total=request.steps)
+
+
+def _sets(path: Path | None, name: str) -> bool:
+    """Return whether a file of settings, which has been read before, has something to say of one."""
+    if path is None:
+        return False
+    try:
+        return name in read_yaml(file_text(path, "give it back"), str(path)).data
+    except TaskGraphTextError:
+        return False  # it holds comments alone

@@ -29,9 +29,34 @@ GROUP: Final = "affordant.learners"
 # Reached by name, so that only the learner that is asked for loads its libraries.
 _OURS: Final = {
     "option-critic": "comparisons.learn.neural:option_critic",
+    "flat-ppo": "comparisons.learn.neural:flat_ppo",
+    "flat-dqn": "comparisons.learn.neural:flat_dqn",
     "maxq-0": "comparisons.learn.tabular:maxq_0",
     "flat-q": "comparisons.learn.tabular:flat_q",
 }
+
+
+# Those that can begin with another one's networks.
+_CARRYING: Final = ("option-critic",)
+
+
+@dataclass(frozen=True, eq=False)
+class Carry:
+    """Networks to begin with: those of a checkpoint that do not see what has moved since.
+
+    Parameters
+    ----------
+    path
+        The checkpoint.
+    moved
+        Names of state variables.
+    tell
+        Is told the names of what was carried.
+    """
+
+    path: Path
+    moved: tuple[str, ...]
+    tell: Callable[[tuple[str, ...]], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +77,8 @@ class Request:
         Single settings as text, by name, which count more than the file.
     steps
         Environment steps to learn for; None for the config's.
+    carry
+        What to begin with; None for networks freshly drawn.
     """
 
     learner: str
@@ -60,6 +87,7 @@ class Request:
     config: Path | None = None
     settings: Mapping[str, str] = field(default_factory=dict)
     steps: int | None = None
+    carry: Carry | None = None
 
 
 class Run(Protocol):
@@ -94,8 +122,8 @@ def learner_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> learner_names()[:3]
-    ('option-critic', 'maxq-0', 'flat-q')
+    >>> learner_names()[:5]
+    ('option-critic', 'flat-ppo', 'flat-dqn', 'maxq-0', 'flat-q')
     """
     return tuple(_points())
 
@@ -111,6 +139,11 @@ def new_run(request: Request) -> Run:
     points = _points()
     if request.learner not in points:
         raise UserError(f"--learner {request.learner}: there is none; {suggest(request.learner, points)}")
+    if request.carry is not None and request.learner not in _CARRYING:
+        raise UserError(
+            f"--carry: the learner {request.learner} has no networks to begin with; "
+            f"leave it out, or use {', '.join(_CARRYING)}"
+        )
     point = points[request.learner]
     try:
         make: Callable[[Request], Run] = point.load()

@@ -17,11 +17,11 @@ from typing import Annotated, Any, Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Field, TypeAdapter
 
 from hierarchy import GroundGraph
 from worlds import UserError
-from worlds.tensor_file import Tensors, read_tensors, replace_files, tensor_bytes
+from worlds.tensor_file import Cards, Tensors, read_tensors, replace_files, tensor_bytes
 
 FORMAT: Final = 1
 """The version of the card's form that is written and read."""
@@ -47,6 +47,8 @@ class Checkpoint:
         The world's name.
     starts
         Predicate of the starts that episodes begin in; empty for all.
+    carried
+        Which checkpoint's networks it began with, and without which variables; empty for none.
     seed
         Of learning.
     config
@@ -78,6 +80,7 @@ class Checkpoint:
     steps: Annotated[int, Field(ge=0)]
     columns: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
     starts: Annotated[str, Field(max_length=4096)] = ""
+    carried: Annotated[str, Field(max_length=4096)] = ""
     sha256: str = ""
     versions: dict[str, str] = field(default_factory=lambda: {name: version(name) for name in _PACKAGES})
     created_by: str = field(default_factory=lambda: f"affordant {version('affordant')}")
@@ -114,7 +117,13 @@ class Restorable(Protocol):
         """Take up a state, or raise a `UserError`."""
 
 
-_CARDS: Final = TypeAdapter(Checkpoint)
+_CARDS: Final = Cards(
+    TypeAdapter(Checkpoint),
+    FORMAT,
+    _MOST_CARD,
+    missing="this is no checkpoint of a learner; name one that affordant learn wrote",
+    mend="learn anew",
+)
 
 
 def save_checkpoint(
@@ -154,7 +163,7 @@ def save_checkpoint(
     known = ~np.isnan(rows)
     arrays |= {_CURVE: np.where(known, rows, 0.0), f"{_CURVE}.known": known}
     text = json.dumps({**asdict(about), "sha256": _hash(arrays)}, indent=2, ensure_ascii=False)
-    _read_card(text, path)
+    _CARDS.read(text, path)
     content = tensor_bytes(path, arrays, {"card": text})
     replace_files({path: content, path.with_suffix(".json"): f"{text}\n".encode()})
 
@@ -169,7 +178,7 @@ def load_checkpoint(path: Path | str) -> Stored:
     """
     path = Path(path)
     tensors, words = read_tensors(path, "check the path, or learn first")
-    about = _read_card(words.get("card"), path)
+    about = _CARDS.read(words.get("card"), path)
     if _hash(tensors) != about.sha256:
         raise UserError(f"{path}: the arrays are not those that were written; copy the checkpoint anew")
     rows, known = tensors.pop(_CURVE, None), tensors.pop(f"{_CURVE}.known", None)
@@ -243,21 +252,3 @@ def _hash(arrays: Arrays) -> str:
         found.update(repr((name, array.dtype.str, array.shape)).encode())
         found.update(array.tobytes())
     return found.hexdigest()
-
-
-def _read_card(text: str | None, path: Path) -> Checkpoint:
-    if text is None:
-        raise UserError(f"{path}: this is no checkpoint of a learner; name one that affordant learn wrote")
-    if len(text) > _MOST_CARD:
-        raise UserError(f"{path}: the card has more than {_MOST_CARD} characters; learn anew")
-    try:
-        about = _CARDS.validate_json(text)
-    except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(part) for part in first["loc"]) or "the whole"
-        raise UserError(f"{path}: the card is wrong at {where}: {first['msg']}; learn anew") from error
-    if about.format != FORMAT:
-        raise UserError(
-            f"{path}: the card is of format {about.format}; this affordant reads {FORMAT}: update it"
-        )
-    return about

@@ -151,3 +151,28 @@ def upon_arrival(
         worth = torch.lerp(worth, ended[..., level], ending[..., level])
     reached = torch.cat([torch.ones_like(going_on), (1 - ending[..., :-1]).cumprod(-1)], -1)
     return worth, reached * torch.stack(ahead[::-1], -1)
+
+
+def summed_to_end(rewards: Tensor, over: Tensor, decay: float) -> Tensor:
+    """Return what is still to come of some rewards before an option is over, discounted.
+
+    Parameters
+    ----------
+    rewards
+        Of each step of trajectories, time the last dimension but one, shape (..., time, 1).
+    over
+        Whether the option is over after the step, of the same shape.
+    decay
+        What one step later is worth.
+
+    Examples
+    --------
+    >>> rewards = torch.tensor([[1.0], [2.0], [4.0]])
+    >>> summed_to_end(rewards, torch.tensor([[False], [True], [False]]), 0.5).flatten().tolist()
+    [2.0, 2.0, 4.0]
+    """
+    found, later = torch.empty_like(rewards), torch.zeros_like(rewards[..., 0, :])
+    for step in reversed(range(rewards.shape[-2])):
+        later = rewards[..., step, :] + decay * later * ~over[..., step, :]
+        found[..., step, :] = later
+    return found

@@ -7,46 +7,41 @@ as the same tables, over the options of the flattened graph, which are the primi
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Final
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from tensordict import TensorDictBase  # type: ignore[import-untyped]
-from tensordict.nn import (  # type: ignore[import-untyped]
-    TensorDictModule,
-    TensorDictModuleBase,
-    TensorDictSequential,
-)
+from tensordict.nn import TensorDictModule, TensorDictSequential  # type: ignore[import-untyped]
 from torch import Generator, Tensor, nn
-from torchrl.collectors import Collector  # type: ignore[import-untyped]
-from torchrl.data import LazyTensorStorage, TensorDictReplayBuffer  # type: ignore[import-untyped]
-from torchrl.envs.utils import ExplorationType  # type: ignore[import-untyped]
 from torchrl.modules import EGreedyModule, ProbabilisticActor, QValueActor  # type: ignore[import-untyped]
-from torchrl.objectives import ClipPPOLoss, DQNLoss, LossModule, SoftUpdate  # type: ignore[import-untyped]
+from torchrl.objectives import ClipPPOLoss, DQNLoss, SoftUpdate  # type: ignore[import-untyped]
 from torchrl.objectives.value import GAE  # type: ignore[import-untyped]
 
 from hierarchy import GroundGraph
 from planners.flat import flattened
+from planners.option_critic.arrays import Arrays
+from planners.option_critic.collecting import CollectingLearner
 from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.greedy import GreedyPolicy
+from planners.option_critic.memory import Memory
 from planners.option_critic.networks import SideBySide
 from planners.option_critic.options import compile_options
-from planners.option_critic.training import Progress
-from worlds.model_env import ModelTorchEnv
-from worlds.torch_stream import generator
 
-_FIRST, _ACT, _ORDER = range(3)  # what a stream of the seed is for
-_MEMORY: Final = 100_000  # steps that flat DQN keeps
+WIDTH: Final = 128
+"""Width of a flat learner's hidden layers, unless said otherwise: one network stands for an option-critic's
+many narrow ones."""
+MEMORY: Final = 100_000
+"""Steps that flat DQN keeps; those of one update if these are more."""
 _TARGET: Final = 0.95  # how much of its target network stays at an update
 _LEAST: Final = 0.05  # share of actions that flat DQN still draws at last
 
 
-class Flat(ABC):
-    """What both baselines share: the world, the schedules, the collecting and the tables.
+class Flat(CollectingLearner):
+    """What both baselines share: the flattened graph, the network and the tables.
 
     Parameters
     ----------
@@ -55,15 +50,15 @@ class Flat(ABC):
     seed
         Names the run: the same seed and config give the same bits on one machine.
     config
-        What to learn with; what it says of options has no say here. Defaults to ``OptionCriticConfig()``.
+        What to learn with; what it says of options has no say here. Defaults to
+        ``OptionCriticConfig(hidden=WIDTH)``.
     starts
         Where episodes of learning begin, shape (states,), bool. Defaults to the model's starts.
     device
         Where torch computes.
     """
 
-    loss: LossModule
-    policy: TensorDictModuleBase
+    unread = frozenset({"terminations", "abstracted", "epsilon", "termination", "prior", "deliberation"})
 
     def __init__(
         self,
@@ -74,37 +69,9 @@ class Flat(ABC):
         starts: NDArray[np.bool_] | None = None,
         device: torch.device | str = "cpu",
     ) -> None:
-        self.grounded, self.seed = flattened(grounded), seed
-        self.config = config = OptionCriticConfig() if config is None else config
-        self.options = compile_options(self.grounded)
-        terminal = self.grounded.nodes[self.grounded.root].terminal
-        self.world = ModelTorchEnv(
-            grounded.model,
-            terminal,
-            config.num_envs,
-            starts=starts,
-            max_steps=config.max_steps,
-            device=device,
-        )
-        self.world.set_seed(seed)
-        self._scale = config.scale(grounded.model.rewards)
-        with _drawing(seed, _FIRST):
-            self._build(generator(seed, _FIRST))
-        self.optimiser = torch.optim.Adam(self.loss.parameters(), lr=config.rate, eps=1e-5)
-        self.updates = 0
-
-    @property
-    def steps(self) -> int:
-        """Environment steps so far."""
-        return self.updates * self.config.per_update
-
-    @abstractmethod
-    def _build(self, draw: Generator) -> None:
-        """Make the policy that collects, the loss, and what else is needed."""
-
-    @abstractmethod
-    def _anneal(self, left: float) -> None:
-        """Set what falls with the share of annealing that is left, besides the learning rate."""
+        config = OptionCriticConfig(hidden=WIDTH) if config is None else config
+        options = compile_options(flattened(grounded))
+        super().__init__(grounded, options, seed, config, starts=starts, device=device)
 
     @abstractmethod
     def _rows(self, batch: TensorDictBase) -> Iterator[TensorDictBase]:
@@ -114,48 +81,16 @@ class Flat(ABC):
     def _preferences(self, observation: Tensor) -> Tensor:
         """Return a number for each action, the best action's the largest, shape (..., actions)."""
 
-    def _network(self, outputs: int, draw: Generator, scale: float = 1.0) -> nn.Module:
+    def _network(self, outputs: int, draw: Generator, *, scaled: bool) -> nn.Module:
+        scale = self.config.scale(self.grounded.model.rewards) if scaled else 1.0
         columns = len(self.world.encoding.columns)
         return _One(columns, outputs, self.config.hidden, scale, draw).to(self.world.device)
-
-    def learn(self) -> Iterator[Progress]:
-        """Learn, and yield after every update, until the config's steps are done."""
-        config = self.config
-        with _drawing(self.seed, _FIRST):
-            collector = Collector(
-                self.world,
-                self.policy,
-                frames_per_batch=config.per_update,
-                total_frames=-1,
-                exploration_type=ExplorationType.RANDOM,
-                no_cuda_sync=True,
-                auto_register_policy_transforms=False,  # no part of the policy looks at where episodes begin
-            )
-        batches = iter(collector)
-        try:
-            while self.steps < config.total:
-                left = config.left(self.steps)
-                self._anneal(left)
-                for group in self.optimiser.param_groups:
-                    group["lr"] = config.rate_with(left)
-                with _drawing(self.seed, _ACT, self.updates):
-                    batch = next(batches)
-                with _drawing(self.seed, _ORDER, self.updates):
-                    measures = self._update(batch)
-                self.updates += 1
-                yield Progress(self.steps, measures)
-        finally:
-            collector.shutdown(close_env=False)
 
     def _update(self, batch: TensorDictBase) -> dict[str, float]:
         found = None
         for rows in self._rows(batch):
             found = self.loss(rows)
-            losses = {name: value for name, value in found.items() if str(name).startswith("loss")}
-            self.optimiser.zero_grad()
-            sum(losses.values()).backward()
-            torch.nn.utils.clip_grad_norm_(self.loss.parameters(), self.config.most_gradient)
-            self.optimiser.step()
+            self._improve(found)
         return {} if found is None else {name: float(value.detach().mean()) for name, value in found.items()}
 
     @torch.no_grad()
@@ -188,8 +123,8 @@ class FlatPPO(Flat):
 
     def _build(self, draw: Generator) -> None:
         config, actions = self.config, len(self.grounded.model.actions)
-        self.actor = self._network(actions, draw)
-        critic = TensorDictModule(self._network(1, draw, self._scale), ["observation"], ["state_value"])
+        self.actor = self._network(actions, draw, scaled=False)
+        critic = TensorDictModule(self._network(1, draw, scaled=True), ["observation"], ["state_value"])
         self.policy = ProbabilisticActor(
             TensorDictModule(self.actor, ["observation"], ["logits"]),
             in_keys=["logits"],
@@ -227,7 +162,7 @@ class FlatDQN(Flat):
     """Flat double deep Q-learning (van Hasselt et al., 2016): `DQNLoss`, a replay buffer, a slow target.
 
     It takes as many steps of the optimiser as the option-critic, on as many rows, drawn from its last
-    100 000 steps. Its epsilon begins at 1, for it has no other way to explore, and falls to 0.05.
+    `MEMORY` steps. Its epsilon begins at 1, for it has no other way to explore, and falls to 0.05.
 
     Examples
     --------
@@ -241,9 +176,11 @@ class FlatDQN(Flat):
     ([32, 64], [0, 1, 2, 3])
     """
 
+    unread = Flat.unread | {"entropy", "lmbda", "clip", "critic"}
+
     def _build(self, draw: Generator) -> None:
         config = self.config
-        self.values = self._network(len(self.grounded.model.actions), draw, self._scale)
+        self.values = self._network(len(self.grounded.model.actions), draw, scaled=True)
         values = QValueActor(self.values, in_keys=["observation"], spec=self.world.action_spec_unbatched)
         self.explorer = EGreedyModule(self.world.action_spec, eps_init=1.0, eps_end=0.0)
         self.policy = TensorDictSequential(values, self.explorer)
@@ -252,24 +189,37 @@ class FlatDQN(Flat):
         )
         self.loss.make_value_estimator(gamma=config.gamma)
         self.target = SoftUpdate(self.loss, eps=_TARGET)
-        self.memory = TensorDictReplayBuffer(
-            storage=LazyTensorStorage(_MEMORY, device=self.world.device), batch_size=config.minibatch
-        )
+        most, rows = max(MEMORY, config.per_update), min(config.minibatch, config.per_update)
+        self.memory = Memory(self.world, most, rows)
 
     def _anneal(self, left: float) -> None:
         self.explorer.eps.fill_(max(_LEAST, left))
 
     def _rows(self, batch: TensorDictBase) -> Iterator[TensorDictBase]:
         config = self.config
-        keys = ["observation", "action", "next"]
-        self.memory.extend(batch.select(*keys).reshape(-1))
+        self.memory.keep(batch)
         for _ in range(config.epochs * -(-config.per_update // config.minibatch)):
-            yield self.memory.sample()
+            yield self.memory.draw()
             self.target.step()  # the optimiser has gone its step by now
 
     def _preferences(self, observation: Tensor) -> Tensor:
         found: Tensor = self.values(observation)
         return found
+
+    def state(self) -> dict[str, NDArray[np.generic]]:
+        """Return all that learning hangs on, what it keeps of its steps included, as arrays by name."""
+        return {**super().state(), **self.memory.state()}
+
+    def _wanted(self, state: Arrays) -> dict[str, NDArray[np.generic]]:
+        made = int(state["updates"]) * self.config.per_update
+        return {**super()._wanted(state), **self.memory.wanted(made)}
+
+    def _bounds(self) -> dict[str, range]:
+        return {**super()._bounds(), **self.memory.bounds()}
+
+    def _take_up(self, state: Arrays) -> None:
+        super()._take_up(state)
+        self.memory.restore(state, self.steps)
 
 
 class _One(nn.Module):
@@ -284,11 +234,3 @@ class _One(nn.Module):
         """Return the outputs, shape (..., outputs)."""
         found: Tensor = self.networks(observation).squeeze(-2) * self.scale
         return found
-
-
-@contextmanager
-def _drawing(*key: int) -> Iterator[None]:
-    """Let TorchRL's parts, which know torch's own generator alone, draw from a stream that integers name."""
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(generator(*key).initial_seed())
-        yield

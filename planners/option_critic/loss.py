@@ -26,9 +26,9 @@ from torchrl.objectives.value import (  # type: ignore[import-untyped]
     TDLambdaEstimator,
 )
 
-from planners.option_critic.choosing import of_option, permitted, upon_arrival
+from planners.option_critic.choosing import of_option, permitted, summed_to_end, upon_arrival
 from planners.option_critic.networks import OneOption
-from planners.option_critic.transform import ACTION_MASK, ENDED, INITIATION
+from planners.option_critic.transform import ACTION_MASK, ENDED, INITIATION, PSEUDO_REWARD
 from worlds import UserError, suggest
 
 _ESTIMATORS: Final = {
@@ -100,6 +100,9 @@ class OptionCriticLoss(LossModule):  # type: ignore[misc]  # TorchRL has no type
             What the environment says of the options.
         reward, done, terminated
             What became of the step.
+        pseudo_reward
+            What the running option's policy, and nothing else, is taught to expect of where it ended, in
+            ``"next"``; may be missing.
         """
 
         action: NestedKey = "action"
@@ -115,6 +118,7 @@ class OptionCriticLoss(LossModule):  # type: ignore[misc]  # TorchRL has no type
         reward: NestedKey = "reward"
         done: NestedKey = "done"
         terminated: NestedKey = "terminated"
+        pseudo_reward: NestedKey = PSEUDO_REWARD
 
     default_keys = _AcceptedKeys
     default_value_estimator = ValueEstimators.GAE
@@ -194,6 +198,8 @@ class OptionCriticLoss(LossModule):  # type: ignore[misc]  # TorchRL has no type
         if chosen not in _ESTIMATORS:
             raise NotImplementedError(f"{chosen} is not possible; choose one of {[*_ESTIMATORS]}")
         settings = {"gamma": 0.99, **({"lmbda": 0.95} if chosen in _WITH_LAMBDA else {}), **hyperparams}
+        lmbda = settings.get("lmbda", float(chosen == ValueEstimators.TD1))
+        self._decay = float(settings["gamma"]) * float(lmbda)
         self._value_estimator = _ESTIMATORS[chosen](value_network=None, **settings)
         self._value_estimator.set_keys(**self._estimator_keys())
 
@@ -202,7 +208,9 @@ class OptionCriticLoss(LossModule):  # type: ignore[misc]  # TorchRL has no type
         """Write the options' values, advantages and targets into trajectories, time last in the batch.
 
         The value of a step is that of its option where it starts, Q(s, o); that of its next state is
-        U(s', o), which goes on or ends there.
+        U(s', o), which goes on or ends there. Pseudo-rewards have no say in values, but advantages take in
+        those that the option comes to before it is over, as a task's own policy does in MAXQ-Q (Dietterich
+        2000, section 4.4).
         """
         keys, after = self.tensor_keys, tensordict["next"]
         option = tensordict[keys.option]
@@ -216,6 +224,11 @@ class OptionCriticLoss(LossModule):  # type: ignore[misc]  # TorchRL has no type
         after.set(keys.value, worth[..., None])
         after.set(keys.ahead, ahead)
         self.value_estimator(tensordict)
+        pseudo_reward = after.get(keys.pseudo_reward, None)
+        if pseudo_reward is not None:
+            over = after[keys.done] | after[keys.ended].any(-1, keepdim=True)
+            taught = summed_to_end(pseudo_reward, over, self._decay)
+            tensordict.set(keys.advantage, tensordict[keys.advantage] + taught)
         return tensordict
 
     def _values(self, tensordict: TensorDictBase) -> tuple[Tensor, Tensor]:

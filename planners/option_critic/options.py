@@ -18,7 +18,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from hierarchy import GroundCall, GroundGraph, checked
+from hierarchy import GroundCall, GroundGraph, GroundTask, checked
 from worlds import UserError
 
 Mask = NDArray[np.bool_]
@@ -74,6 +74,9 @@ class Options:
         action has always ended after its step; levels that an option lacks never end.
     shares
         Whether two options make the same calls above a level, shape (levels, options, options).
+    pseudo_reward
+        What the policy of the task on top of an option is taught to expect of ending in a state, shape
+        (states, options): 0 where it ends well or not at all, and where the graph gives none.
     tasks
         Places of the tasks on top of stacks, those that have a policy over primitive actions.
     task
@@ -108,6 +111,7 @@ class Options:
     initiation: Mask
     ended: Mask
     shares: Mask
+    pseudo_reward: NDArray[np.float32]
     tasks: tuple[int, ...]
     task: NDArray[np.int64]
     action: NDArray[np.int64]
@@ -176,6 +180,7 @@ def compile_options(grounded: GroundGraph) -> Options:
         initiation=initiation,
         ended=ended,
         shares=np.array([[[a[:n] == b[:n] for b in stacks] for a in stacks] for n in range(levels)]),
+        pseudo_reward=np.stack([_pseudo_reward(nodes[top]) for top in tops], axis=1),
         tasks=tasks,
         task=own,
         action=action,
@@ -207,6 +212,11 @@ def _available(grounded: GroundGraph, edge: Edge) -> Mask:
     """Return where a caller may call a child, by any of its calls of it, shape (states,)."""
     found: Mask = np.any([call.available for call in _calls(grounded, edge)], axis=0)
     return found
+
+
+def _pseudo_reward(node: GroundTask) -> NDArray[np.float32]:
+    short = node.terminal & ~node.goal
+    return np.where(short, node.pseudo_reward or 0.0, 0.0).astype(np.float32)
 
 
 def _actions(grounded: GroundGraph, tops: list[int]) -> Mask:

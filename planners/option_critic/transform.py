@@ -7,7 +7,8 @@ from typing import Final
 import torch
 from tensordict import TensorDictBase  # type: ignore[import-untyped]
 from torch import Tensor
-from torchrl.data import Binary, Bounded, TensorSpec  # type: ignore[import-untyped]
+from torch.nn import functional
+from torchrl.data import Binary, Bounded, TensorSpec, Unbounded  # type: ignore[import-untyped]
 from torchrl.envs import Transform  # type: ignore[import-untyped]
 
 from planners.option_critic.options import NONE, Options
@@ -20,6 +21,10 @@ ENDED: Final = "ended"
 """Whether the running option's task at a level has ended here, shape (levels,), bool; all where none runs."""
 ACTION_MASK: Final = "option_action_mask"
 """Which actions each option may take, shape (options, actions), bool."""
+
+
+PSEUDO_REWARD: Final = "pseudo_reward"
+"""What the running option's policy is taught to expect of where it has ended, shape (1,), float32."""
 
 
 class OptionTables(torch.nn.Module):
@@ -41,12 +46,13 @@ class OptionTables(torch.nn.Module):
     ended: Tensor
     shares: Tensor
     actions: Tensor
+    pseudo_reward: Tensor
 
     def __init__(self, options: Options) -> None:
         super().__init__()
         states, levels, count = options.initiation.shape
         self.register_buffer("initiation", torch.as_tensor(options.initiation), persistent=False)
-        # The last row of these two stands for no running option, which NONE = -1 reads.
+        # The last row of these, and of the last table, stands for no running option, which NONE = -1 reads.
         everywhere = torch.ones(states, 1, levels, dtype=torch.bool)
         ended = torch.as_tensor(options.ended).transpose(1, 2)
         self.register_buffer("ended", torch.cat([ended, everywhere], 1), persistent=False)
@@ -54,6 +60,8 @@ class OptionTables(torch.nn.Module):
         fresh = torch.ones(1, levels, count, dtype=torch.bool)
         self.register_buffer("shares", torch.cat([shares, fresh]), persistent=False)
         self.register_buffer("actions", torch.as_tensor(options.actions), persistent=False)
+        pseudo_reward = functional.pad(torch.as_tensor(options.pseudo_reward), (0, 1))
+        self.register_buffer("pseudo_reward", pseudo_reward, persistent=False)
 
     def forward(self, state: Tensor, running: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Return `INITIATION`, `ENDED` and `ACTION_MASK` for states and running options of any shape."""
@@ -71,17 +79,22 @@ class TaskStack(Transform):  # type: ignore[misc]  # TorchRL has no types
     ----------
     options
         The options, over the states that the environment gives as ``"state"``.
+    pseudo_rewards
+        Whether the graph's pseudo-rewards are written, if it has any.
 
     Notes
     -----
     It reads ``"option"``, which the policy writes; after an action that came without one, none runs. It
-    writes `RUNNING`, `INITIATION`, `ENDED` and `ACTION_MASK`. Any environment that gives these four can be
-    learnt by `OptionCriticLoss`.
+    writes `RUNNING`, `INITIATION`, `ENDED` and `ACTION_MASK`, and `PSEUDO_REWARD` where the graph has one.
+    Any environment that gives the first four can be learnt by `OptionCriticLoss`. Where ``"_step"`` is
+    given, environments that it does not name keep the option that runs, whatever the policy has chosen.
     """
 
-    def __init__(self, options: Options) -> None:
-        super().__init__(in_keys=["state"], out_keys=[RUNNING, INITIATION, ENDED, ACTION_MASK])
-        self.options, self.tables = options, OptionTables(options)
+    def __init__(self, options: Options, *, pseudo_rewards: bool = True) -> None:
+        teaches = pseudo_rewards and bool(options.pseudo_reward.any())
+        written = [RUNNING, INITIATION, ENDED, ACTION_MASK, *([PSEUDO_REWARD] if teaches else [])]
+        super().__init__(in_keys=["state"], out_keys=written)
+        self.options, self.tables, self.teaches = options, OptionTables(options), teaches
         self.running: Tensor | None = None
         self._resumed: Tensor | None = None
 
@@ -93,6 +106,8 @@ class TaskStack(Transform):  # type: ignore[misc]  # TorchRL has no types
         self.running = running
         initiation, ended, actions = self.tables(tensordict.get("state"), running)
         found = {RUNNING: running, INITIATION: initiation, ENDED: ended, ACTION_MASK: actions}
+        if self.teaches:
+            found[PSEUDO_REWARD] = self.tables.pseudo_reward[tensordict.get("state"), running][..., None]
         return tensordict.update(found)
 
     def _reset(self, tensordict: TensorDictBase, tensordict_reset: TensorDictBase) -> TensorDictBase:
@@ -108,6 +123,9 @@ class TaskStack(Transform):  # type: ignore[misc]  # TorchRL has no types
         option = tensordict.get("option", None)
         if option is None:
             option = torch.full_like(next_tensordict.get("state"), NONE)
+        moving = tensordict.get("_step", None)
+        if moving is not None and self.running is not None:
+            option = torch.where(moving.view_as(option), option, self.running)
         return self._written(next_tensordict, option)
 
     def transform_observation_spec(self, observation_spec: TensorSpec) -> TensorSpec:
@@ -122,4 +140,6 @@ class TaskStack(Transform):  # type: ignore[misc]  # TorchRL has no types
             (ACTION_MASK, (count, actions)),
         ):
             observation_spec[name] = Binary(shape=(*batch, *shape), dtype=torch.bool, device=device)
+        if self.teaches:
+            observation_spec[PSEUDO_REWARD] = Unbounded(shape=(*batch, 1), dtype=torch.float32, device=device)
         return observation_spec

@@ -132,3 +132,19 @@ def test_help_is_light(code: str, heavy: set[str]) -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     assert not heavy & set(done.stdout.splitlines()[-1].split())
+
+
+def test_a_reader_that_has_had_enough_ends_it_quietly() -> None:
+    """As in `affordant maze ... | head -1`, or with a reader that is gone: the status is SIGPIPE's, 141."""
+    code = "import sys; from comparisons.cli import main; sys.stdin.read(1); main()"
+    words = [sys.executable, "-c", code, "maze", "--rows", "9", "--cols", "12"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=pipe) as command:  # noqa: S603 - ourselves
+        assert command.stdin is not None
+        assert command.stdout is not None
+        assert command.stderr is not None
+        command.stdout.close()
+        command.stdin.write(b"!")
+        command.stdin.close()
+        told = command.stderr.read()
+    assert (command.returncode, told) == (141, b"")

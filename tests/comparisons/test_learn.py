@@ -18,6 +18,7 @@ import pytest
 from comparisons.cli import main
 from comparisons.learn import registry
 from comparisons.learn.line import Line, Measured
+from comparisons.learn.neural import NeuralRun
 from comparisons.learn.registry import Request, learner_names, new_run
 from comparisons.learn.tabular import TabularRun, greedy_tables
 from hierarchy import ground
@@ -30,6 +31,7 @@ from worlds import UserError
 
 MAZE = "grid\n. . : D1 G1\nT1 . | . .\n. . : D2 .\nstart 0,0\ntrigger T1\ngoal G1\n"
 QUICK = ("--set", "num_envs=16", "horizon=16", "hidden=8", "minibatch=100", "max_steps=20")
+OURS = ("option-critic", "flat-ppo", "flat-dqn", "maxq-0", "flat-q")
 FILES = ("checkpoint.json", "checkpoint.safetensors", "curve.csv")
 
 
@@ -147,6 +149,34 @@ def test_told_to_stop_it_saves_and_says_how_to_go_on(
     assert same_files("a broken one", "whole")
 
 
+@pytest.mark.parametrize("learner", ["option-critic", "flat-ppo", "flat-dqn"])
+def test_a_run_with_networks_goes_on_after_ctrl_c(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, learner: str
+) -> None:
+    """The command that it prints leaves the same bytes as a run that nothing broke off."""
+    tokens = ("two_rooms", "--learner", learner, "--world", "small.maze", *QUICK, "--steps", "2560", "--out")
+    ended, *_ = run(capsys, *tokens, "whole")
+    usual, seen = NeuralRun.due, list[bool]()
+
+    def due(run: NeuralRun) -> bool:
+        seen.append(usual(run))
+        if len(seen) == 5:
+            os.kill(os.getpid(), signal.SIGINT)
+        return seen[-1]
+
+    with monkeypatch.context() as patched:
+        patched.setattr(NeuralRun, "due", due)
+        assert run(capsys, *tokens, "broken")[:2] == (130, "")
+    assert seen == [False, True, False, True, False]
+    about = load_checkpoint("broken/checkpoint.safetensors").about
+    assert (about.learner, about.steps) == (learner, 5 * 256)
+    assert not same_files("broken", "whole")
+    going_on = (*tokens, "broken", "--resume")
+    assert "begun with setting gamma 0.98, not 0.5" in run(capsys, *going_on, "--set", "gamma=0.5")[2]
+    assert run(capsys, *going_on)[0] == ended
+    assert same_files("broken", "whole")
+
+
 def test_a_run_that_was_never_evaluated_is_told_of(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,6 +240,23 @@ def test_a_folder_that_stays_empty_is_taken_away(
         (("two_rooms", "--out", "x", "--resume"), "leave --resume out to begin"),
         (("two_rooms", "--out", "x", "--learner", "flat-q", "--terminations", "prior"), "has no settings"),
         (("two_rooms", "--out", "x", "--lerner", "flat-q"), "Did you mean --learner"),
+        (
+            ("two_rooms", "--out", "x", "--learner", "flat-ppo", "--terminations", "prior"),
+            "--terminations: the learner flat-ppo has no use for terminations; leave it out. "
+            "Its settings are hidden, num_envs, ",
+        ),
+        (
+            ("two_rooms", "--out", "x", "--learner", "flat-ppo", "--set", "rate=1e-3", "prior=1"),
+            "--set prior: the learner flat-ppo has no use for prior",
+        ),
+        (
+            ("two_rooms", "--out", "x", "--learner", "flat-dqn", "--set", "clip=0.1"),
+            "--set clip: the learner flat-dqn has no use for clip",
+        ),
+        (
+            ("two_rooms", "--out", "x", "--learner", "flat-ppo", "--set", "rte=1"),
+            "rte=1: there is no such setting; did you mean 'rate'?",
+        ),
     ],
 )
 def test_wrong_input_is_one_message(
@@ -246,6 +293,29 @@ def test_another_run_is_not_gone_on_with(capsys: pytest.CaptureFixture[str]) -> 
     Path("small.maze").write_text(MAZE)
     Path("run/checkpoint.safetensors").write_bytes(kept[: len(kept) // 2])
     assert "no safetensors file, or a broken one" in run(capsys, *tokens, "--resume")[2]
+
+
+@pytest.mark.parametrize("learner", ["flat-ppo", "flat-dqn"])
+def test_flat_learners_are_wide_unless_said_otherwise(learner: str) -> None:
+    """By name, or in a file, in which settings that are not read are let be, and never count."""
+    graph, world = load_graph("two_rooms", load_world("small.maze"))
+    grounded = checked(graph, world.model())
+    file = Path("mine.yaml")
+
+    def width(text: str, **settings: str) -> object:
+        file.write_text(text)
+        found = new_run(Request(learner, grounded, 0, file, settings, 512)).settings
+        assert found["total"] == 512
+        assert not found.keys() & {"terminations", "abstracted", "epsilon", "prior", "deliberation"}
+        return found["hidden"]
+
+    assert new_run(Request(learner, grounded)).settings["hidden"] == 128
+    assert width("# nothing yet\n") == 128
+    assert width("prior: 2.0\nterminations: prior\n") == 128
+    assert width("hidden: 32\n") == 32
+    assert width("hidden: 32\n", hidden="16") == 16
+    assert width("rate: 0.1\n", hidden="16") == 16
+    assert new_run(Request("option-critic", grounded)).settings["hidden"] == 32
 
 
 @pytest.mark.slow
@@ -314,7 +384,7 @@ def test_a_package_can_add_a_learner(monkeypatch: pytest.MonkeyPatch) -> None:
         EntryPoint("broken", "nowhere:none", registry.GROUP),
     ]
     monkeypatch.setattr(registry, "entry_points", lambda **_: points)
-    assert learner_names() == ("option-critic", "maxq-0", "flat-q", "broken", "mine")
+    assert learner_names() == (*OURS, "broken", "mine")
     graph, world = load_graph("taxi")
     grounded = ground(graph, world.model())
     for name in ("mine", "maxq-0"):

@@ -122,6 +122,27 @@ def test_advantages_go_by_the_worth_upon_arrival(learnt: bool) -> None:
             assert found["value_target"][i, t].item() == pytest.approx(float(carried + own))
 
 
+@pytest.mark.parametrize(("kind", "lmbda"), [("GAE", 0.95), ("TD0", 0.0), ("TD1", 1.0), ("TDLambda", 0.95)])
+def test_pseudo_rewards_teach_an_option_until_it_is_over(kind: str, lmbda: float) -> None:
+    """Advantages take in those before the option's end, discounted as rewards are; values and targets none."""
+    loss, steps = _loss(), _steps()
+    loss.make_value_estimator(ValueEstimators[kind], gamma=0.9)
+    plain = loss.advantages(steps.clone())
+    draw = generator(5)
+    steps["next", "pseudo_reward"] = -torch.rand(*steps.shape, 1, generator=draw, dtype=torch.float64)
+    found = loss.advantages(steps)
+    taught = found["advantage"] - plain["advantage"]
+    for i in range(len(steps)):
+        carried = 0.0
+        for t in reversed(range(steps.shape[1])):
+            after = steps[i, t]["next"]
+            over = bool(after["done"]) or bool(after["ended"].any())
+            carried = float(after["pseudo_reward"]) + (0.0 if over else 0.9 * lmbda * carried)
+            assert taught[i, t].item() == pytest.approx(carried)
+    assert torch.equal(found["value_target"], plain["value_target"])
+    assert torch.equal(found["next", "state_value"], plain["next", "state_value"])
+
+
 @pytest.mark.parametrize("kind", ESTIMATORS)
 def test_any_estimator_writes_targets(kind: ValueEstimators) -> None:
     """Where the episode ends the target is the reward, one step ahead it is TD(0)'s; losses are finite."""

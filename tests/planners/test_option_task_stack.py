@@ -4,7 +4,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from option_runs import NAMES, allowed, choices, left_of, named, sound_graphs
-from tensordict import TensorDictBase
+from tensordict import TensorDict, TensorDictBase
 from torchrl.envs import TransformedEnv
 from torchrl.envs.utils import check_env_specs
 
@@ -73,6 +73,10 @@ def _as_in_the_slow_run(options: Options, steps: TensorDictBase) -> None:
         ended = step["next", "ended"].tolist()
         kept = len(left_of(grounded, paths[option], after))
         assert (ended.index(True) if any(ended) else len(paths[option])) == kept
+        if options.pseudo_reward.any():
+            top = grounded.nodes[paths[option][-1]]
+            short = top.terminal[after] and not top.goal[after]
+            assert float(step["next", "pseudo_reward"]) == (top.pseudo_reward if short else 0)
         fresh, running = bool(step["next", "done"]), option
     assert len(steps) > 0
 
@@ -123,3 +127,63 @@ def test_only_what_is_reset_begins_anew() -> None:
     assert torch.equal(env.transform.running, found["running"])
     assert found["ended"][1].all()
     assert torch.equal(found["initiation"][0], last["initiation"][0])
+
+
+class _Each:
+    """Ends what has ended, and chooses by an environment's number and step alone."""
+
+    def __init__(self, number: int) -> None:
+        self.taken = torch.zeros(number, dtype=torch.int64)
+
+    def __call__(self, tensordict: TensorDictBase) -> TensorDictBase:
+        running = tensordict["running"]
+        draw = (self.taken * 0.37 + torch.arange(len(running)) * 0.21) % 1
+        switch, level = first_ended(tensordict["ended"])
+        chosen = any_of(of_option(tensordict["initiation"], level), draw)
+        option = torch.where(switch, chosen, running)
+        action = any_of(of_option(tensordict["option_action_mask"], option), draw)
+        return tensordict.update({"option": option, "action": action})
+
+
+@pytest.mark.parametrize("column", [False, True])
+def test_those_that_do_not_step_keep_their_option_and_tables(column: bool) -> None:
+    """With `_step`, each environment goes the way that it goes when all step, only later."""
+    number, steps = 4, 40
+    keys = ("state", "running", "initiation", "ended", "option_action_mask")
+    ways = []
+    for draw in (None, generator(5)):
+        env, policy = _env(compile_options(named("taxi")), number, 2, max_steps=1000), _Each(number)
+        data, seen = env.reset(), [[] for _ in range(number)]
+        while min(policy.taken.tolist()) < steps:
+            moving = torch.ones(number, dtype=torch.bool)
+            if draw is not None:
+                moving = torch.rand(number, generator=draw) < torch.tensor([0.1, 0.5, 0.9, 1.0])
+            before = data.select(*keys).clone()
+            data = policy(data)
+            for i in moving.nonzero()[:, 0].tolist():
+                seen[i].append((*before[i]["state"].view(1).tolist(), int(data["option"][i])))
+            if draw is not None:
+                data["_step"] = moving[:, None] if column else moving
+            data = env.step(data)["next"].exclude("reward").clone()
+            policy.taken += moving
+            for key in keys:
+                assert torch.equal(data[key][~moving], before[key][~moving])
+            assert torch.equal(env.transform.running, data["running"])
+        ways.append([way[:steps] for way in seen])
+    assert ways[0] == ways[1]
+    assert len({option for way in ways[0] for _, option in way}) >= 4
+
+
+def test_a_rollout_until_all_are_done_leaves_those_that_are_as_they_ended() -> None:
+    """TorchRL's own use of `_step`: the last of each environment's steps stays, running option and all."""
+    env = _env(compile_options(named("two_rooms")), 6, 1, max_steps=150)
+    steps = env.rollout(150, _Wanders(2), break_when_any_done=False, break_when_all_done=True)
+    lengths = (~steps["next", "done"][..., 0]).sum(1).tolist()
+    assert len(set(lengths)) > 1
+    assert isinstance(steps, TensorDict)
+    for one, length in zip(steps, lengths, strict=True):
+        _as_in_the_slow_run(env.transform.options, one[: length + 1])
+        last = one["next", "running"][length]
+        assert (one["next", "running"][length:] == last).all()
+        assert int(last) == int(one["option"][length])
+    assert torch.equal(env.transform.running, steps["next", "running"][:, -1])
