@@ -124,7 +124,7 @@ def test_advantages_go_by_the_worth_upon_arrival(learnt: bool) -> None:
 
 @pytest.mark.parametrize(("kind", "lmbda"), [("GAE", 0.95), ("TD0", 0.0), ("TD1", 1.0), ("TDLambda", 0.95)])
 def test_pseudo_rewards_teach_an_option_until_it_is_over(kind: str, lmbda: float) -> None:
-    """Advantages take in those before the option's end, discounted as rewards are; values and targets none."""
+    """Advantages take in those before the end, discounted as rewards are; values and targets none."""
     loss, steps = _loss(), _steps()
     loss.make_value_estimator(ValueEstimators[kind], gamma=0.9)
     plain = loss.advantages(steps.clone())
