@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -232,7 +233,7 @@ def _refuse_other(path: Path, was: Checkpoint, now: Checkpoint) -> None:
 
 @contextmanager
 def _folder(out: Path) -> Iterator[None]:
-    """Make the folder at once, so that nothing is learnt in vain; take it away if it stays empty."""
+    """Make the folder at once, so that nothing is learnt in vain; take it away if nothing is kept in it."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -240,8 +241,8 @@ def _folder(out: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):  # it holds what was learnt
-            out.rmdir()
+        if not (out / CHECKPOINT).exists():  # a log there tells of nothing that could go on
+            shutil.rmtree(out, ignore_errors=True)
 
 
 @contextmanager

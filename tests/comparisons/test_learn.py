@@ -321,7 +321,7 @@ def test_flat_learners_are_wide_unless_said_otherwise(learner: str) -> None:
 @pytest.mark.slow
 def test_learning_that_goes_astray_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     """Numbers that are none any more are never kept; the message says what to change."""
-    tokens = ("two_rooms", "--world", "small.maze", *QUICK, "rate=1e30", "--steps", "5120")
+    tokens = ("two_rooms", "--world", "small.maze", *QUICK, "rate=1e30", "--steps", "5120", "--logger", "csv")
     status, _, err = run(capsys, *tokens, "--out", "run")
     assert (status, "learning went astray: after " in err) == (2, True)
     assert "lower the setting rate" in err
