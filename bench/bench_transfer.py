@@ -29,7 +29,7 @@ from scipy.sparse import csr_array
 from side_by_side import machine
 from transfer_pictures import table, transfer_figure
 
-from comparisons.learn.tabular import greedy_tables
+from comparisons.learn.greedy_tables import greedy_tables
 from comparisons.style import picture
 from hierarchy import ground
 from hierarchy.four_rooms import four_rooms_graph

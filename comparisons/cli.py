@@ -15,6 +15,7 @@ from cyclopts import App, CycloptsError, Parameter
 from rich.console import Console
 
 from comparisons.stopping import orderly_exit
+from comparisons.study.command import study
 from worlds.errors import UserError
 
 app = App(
@@ -23,6 +24,7 @@ app = App(
     version=lambda: version("affordant"),
     help_format="plaintext",
 )
+app.command(study)
 
 
 @app.command
@@ -306,14 +308,14 @@ def learn(
         Directory to make, for checkpoint.safetensors, its card as JSON, and the learning curve, curve.csv.
     learner
         Learner: option-critic; flat-ppo or flat-dqn, which know no tasks (setting hidden is 128 unless
-        given); maxq-0 or flat-q, which keep tables; or one that an installed package adds.
+        given); maxq-0, maxq-q, hsmq or flat-q, which keep tables; or one that an installed package adds.
     world
         World to learn on: a name (also gym:Taxi-v4 and its like), or a .maze file. Defaults to the one that
         the graph names.
     seed
         Of learning: the same seed and settings give the same curve and checkpoint on one machine.
     config
-        YAML file of the network learners' settings, those that differ from option_critic.yaml.
+        YAML file of the learner's settings, those that differ from the defaults.
     terminations
         What ends a task: given (the graph), learnt, or prior (learnt, with the graph as a prior).
     settings

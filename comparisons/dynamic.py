@@ -7,17 +7,42 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from comparisons.robot import Encounter, Run
-from planners import LocalRule, Proof, Replanner, prove
+from planners import LocalRule, Proof, Replanner, Strategy, prove
 from worlds import Episode, Layout, Outcome, Stream
-from worlds.appearing import random_obstacles, shortest_way
+from worlds.appearing import ON_THE_WAY, random_obstacles, shortest_way
 
 MOST_OBSTACLES = 6
 
 
-def random_episode(layout: Layout, seed: int, number: int) -> tuple[Episode, str, str]:
+def random_episode(
+    layout: Layout,
+    seed: int,
+    number: int,
+    obstacles: int | None = None,
+    *,
+    spheres: float = 0.5,
+    on_way: float = ON_THE_WAY,
+) -> tuple[Episode, str, str]:
     """Return random episode `number` of a seed, and its pair: random pair, start, and obstacles on the way.
 
-    One to six obstacles; none appears on the start, the trigger or the goal.
+    None appears on the start, the trigger or the goal. With more obstacles the pair, the start and the
+    obstacles that there were stay the same.
+
+    Parameters
+    ----------
+    layout
+        The maze.
+    seed, number
+        Name the episode.
+    obstacles
+        How many there are. Defaults to one to six, drawn.
+    spheres, on_way
+        As in `worlds.appearing.random_obstacles`.
+
+    Raises
+    ------
+    ValueError
+        If the maze has too few free cells.
 
     Examples
     --------
@@ -31,9 +56,11 @@ def random_episode(layout: Layout, seed: int, number: int) -> tuple[Episode, str
     marks = layout.triggers[trigger], layout.goals[goal]
     start = stream.choose(sorted(layout.room(layout.start) - {marks[0]}))
     way = shortest_way(layout, start, *marks)
-    count = 1 + stream.below(MOST_OBSTACLES)
-    obstacles = random_obstacles(layout, stream, count, way, frozenset({start, *marks}))
-    return Episode(layout, trigger, goal, start, obstacles), trigger, goal
+    drawn = 1 + stream.below(MOST_OBSTACLES)
+    count = drawn if obstacles is None else obstacles
+    ends = frozenset({start, *marks})
+    appear = random_obstacles(layout, stream, count, way, ends, spheres=spheres, on_way=on_way)
+    return Episode(layout, trigger, goal, start, appear), trigger, goal
 
 
 @dataclass(frozen=True)
@@ -66,12 +93,22 @@ def judge(oracle: Replanner, local: LocalRule, encounter: Encounter) -> Verdict 
     replanned = None if action is None else prove(oracle, task, belief, action)
     if replanned is None:
         return None
-    answer = local.affordance(task, encounter.cell, belief)
-    choice = answer.action
-    if not answer.on_route:
-        route = local.route(task, belief)
-        choice = None if route is None else route[0]
+    choice = choice_of(local, encounter)
     return Verdict(encounter, None if choice is None else prove(oracle, task, belief, choice), replanned)
+
+
+def choice_of(strategy: Strategy, encounter: Encounter) -> int | None:
+    """Return the action that a strategy takes in the situation of another's affordance.
+
+    It is the affordance, or where the obstacle is not on this strategy's route, the route's first action;
+    None where the strategy has no action at all.
+    """
+    task, belief = encounter.task, encounter.belief
+    answer = strategy.affordance(task, encounter.cell, belief)
+    if answer.on_route:
+        return answer.action
+    route = strategy.route(task, belief)
+    return None if route is None else route[0]
 
 
 @dataclass

@@ -117,8 +117,9 @@ def counterexample_figure(
     optimal_route: Sequence[Cell],
     *,
     texts: tuple[str, str] = ("", ""),
+    name: str = "the paper's local rule",
 ) -> Figure:
-    """Draw a state in which the paper's local rule falls short, beside an optimal strategy.
+    """Draw a state in which a strategy falls short, beside an optimal one.
 
     Parameters
     ----------
@@ -133,6 +134,8 @@ def counterexample_figure(
         cross at its end.
     texts
         A line or two below each panel.
+    name
+        The strategy that falls short.
 
     Examples
     --------
@@ -143,7 +146,7 @@ def counterexample_figure(
     >>> len(figure.axes)
     2
     """
-    routes = {"the paper's local rule": local_route, "an optimal strategy": optimal_route}
+    routes = {name: local_route, "an optimal strategy": optimal_route}
     ends = ["" if route[-1] in goals else "not there after " for route in routes.values()]
     titles = [
         f"{title}: {end}{_steps(route)}" for (title, route), end in zip(routes.items(), ends, strict=True)

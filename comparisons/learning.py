@@ -91,11 +91,15 @@ class PairLearner:
     def learn(self, *, curves: bool = False) -> dict[str, Curve]:
         """Carry out every phase of learning; return figure 12's curves if they are asked for."""
         found = self._learn_curves() if curves else {}
-        for task in self.subtasks():
-            self.runs.train(self.grounded.place(task), self._starts(task), EPISODES)
-        self.runs.train(self.grounded.root, self._starts(self.subtasks()[0]), ROOT_EPISODES)
+        for phase in self.phases():
+            self.runs.train(*phase)
         self.__dict__.pop("learner", None)  # the first run has learnt more since it was last asked for
         return found
+
+    def phases(self) -> list[tuple[int, list[int], int]]:
+        """Return the task, the starts and the episodes of each phase of learning, in order."""
+        parts = [(self.grounded.place(task), self._starts(task), EPISODES) for task in self.subtasks()]
+        return [*parts, (self.grounded.root, self._starts(self.subtasks()[0]), ROOT_EPISODES)]
 
     def step_table(self, task: str) -> Table:
         """Return the greedy policy's steps from every grid of a subtask's room (figure 13)."""

@@ -201,7 +201,7 @@ def _sections(sections: Sequence[Section], pictures: Mapping[str, Picture]) -> l
                     f"section {section.title!r} names the figure {name!r}, which is not given ({known})"
                 )
             figure_number += 1
-            drawn = _picture(pictures[name], f"f{figure_number}", caption)
+            drawn = inline_picture(pictures[name], f"f{figure_number}", caption)
             shown.append({"number": figure_number, "caption": caption, "picture": drawn})
         tables = []
         for table in section.tables:
@@ -247,7 +247,7 @@ def _cell(value: Value) -> dict[str, Any]:
             return {"text": text, "number": _NUMBER.fullmatch(text) is not None, "verdict": ""}
 
 
-def _picture(drawn: Picture, prefix: str, caption: str) -> Markup:
+def inline_picture(drawn: Picture, prefix: str, caption: str) -> Markup:
     """Return a figure as inline SVG or as a PNG in an `img`, whichever is shorter."""
     width = round(_PIXELS * drawn.width)
     svg = _inline_svg(drawn.svg, prefix, caption, width)

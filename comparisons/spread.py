@@ -96,7 +96,7 @@ def spread(
     workers = min(checked_workers(workers), max(len(jobs), 1))
     ours = set(active_children())
     with (
-        _one_thread_each(),
+        one_thread_each(),
         ProcessPoolExecutor(workers, get_context("spawn"), initializer=_start, initargs=given) as pool,
     ):
         found: dict[int, R] = {}
@@ -137,10 +137,14 @@ def _run(work: Callable[..., R], job: Any, description: str) -> R:
         raise UserError(f"{description}: {job}: {reason(error)}") from error
 
 
-def _start(*given: Any) -> None:
-    """Begin a worker: it leaves Ctrl-C to its parent, and ends with it."""
+def begin_worker() -> None:
+    """Begin a worker process: it leaves Ctrl-C to its parent, and ends with it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _start(*given: Any) -> None:
+    begin_worker()
     _HANDED[:] = given
 
 
@@ -152,7 +156,7 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _one_thread_each() -> Iterator[None]:
+def one_thread_each() -> Iterator[None]:
     """Let processes that start meanwhile use one thread each: sums of several differ in their last bits."""
     before = {name: os.environ.get(name) for name in _ONE_THREAD}
     os.environ.update(dict.fromkeys(_ONE_THREAD, "1"))

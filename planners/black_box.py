@@ -145,6 +145,8 @@ class BlackBoxMaxQ(MaxQ):
         starts: Sequence[int],  # noqa: ARG002
         episodes: int,  # noqa: ARG002
         after_each: Callable[[], None] | None = None,  # noqa: ARG002
+        *,
+        afresh: bool = True,  # noqa: ARG002
     ) -> list[int]:
         """Refuse: a black box begins its episodes where it will, so call `learn`."""
         raise UserError("a black box cannot be put into a state to train from; call learn(episodes)")

@@ -128,18 +128,22 @@ class Learner(TaskValues):
         starts: Sequence[int],
         episodes: int,
         after_each: Callable[[], None] | None = None,
+        *,
+        afresh: bool = True,
     ) -> list[int]:
         """Run episodes of a task, each from a random one of `starts`; return their primitive steps.
 
         The task's rate and exploration start afresh, as each of figure 12's curves does; what it and its
-        children have learnt stays. `after_each` is called after every episode, to take a measurement.
+        children have learnt stays. `after_each` is called after every episode, to take a measurement. If not
+        `afresh`, the schedules go on falling.
 
         Raises
         ------
         EpisodeTooLongError
             If an episode passes the settings' `max_steps`.
         """
-        self.episodes[task] = 0
+        if afresh:
+            self.episodes[task] = 0
         counts = []
         for _ in range(episodes):
             self._limit = self.steps + self.settings.max_steps

@@ -7,7 +7,7 @@ first in order among equals, until it ends.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate
 
 from hierarchy import GroundGraph
@@ -119,6 +119,7 @@ def _choices(grounded: GroundGraph, place: int) -> list[tuple[int, ...]]:
     return [tuple(k for k, on in enumerate(row) if on) for row in zip(*columns, strict=True)]
 
 
+@lru_cache(maxsize=2)  # learners of one world share it
 def _outcomes(model: TransitionModel) -> list[list[list[tuple[int, float, float]]]]:
     """Return, by state and action, the outcomes that occur: next state, reward, cumulated probability."""
     table = []

@@ -70,10 +70,13 @@ def random_obstacles(
     count: int,
     way: Sequence[Cell],
     keep_free: frozenset[Cell] = frozenset(),
+    *,
+    spheres: float = 0.5,
+    on_way: float = ON_THE_WAY,
 ) -> tuple[Obstacle, ...]:
     """Draw obstacles that appear while a robot follows a way, most of them on it.
 
-    With probability `ON_THE_WAY` an obstacle appears in a cell of the way, at a step when a robot that
+    With probability `on_way` an obstacle appears in a cell of the way, at a step when a robot that
     follows the way is one to `FARTHEST` cells before it; otherwise (and once the way is full) in any
     free cell, at a step of 0 to ``len(way)``. No two share a cell.
 
@@ -89,6 +92,10 @@ def random_obstacles(
         The cells that the robot is expected in, step by step, its start first.
     keep_free
         Cells in which nothing may appear, such as the start, the trigger and the goal.
+    spheres
+        Probability that an obstacle is a sphere.
+    on_way
+        Probability that it appears on the way, where there is room for it.
 
     Returns
     -------
@@ -116,10 +123,11 @@ def random_obstacles(
     obstacles: list[Obstacle] = []
     numbers = dict.fromkeys(KINDS, 0)
     for _ in range(count):
-        kind = stream.choose(KINDS)
+        kind = KINDS[stream.uniform() >= 1 - spheres]
         size = stream.choose(SIZES)
         colour = f"#{stream.below(_COLOURS):06x}"
-        cell, step = _place_and_step(stream, way, [cell for cell in free if cell not in taken], taken)
+        left = [cell for cell in free if cell not in taken]
+        cell, step = _place_and_step(stream, way, left, taken, on_way)
         taken.add(cell)
         numbers[kind] += 1
         name = f"{kind[0].upper()}{numbers[kind]}"
@@ -128,13 +136,13 @@ def random_obstacles(
 
 
 def _place_and_step(
-    stream: Stream, way: Sequence[Cell], free: Sequence[Cell], taken: set[Cell]
+    stream: Stream, way: Sequence[Cell], free: Sequence[Cell], taken: set[Cell], on_way: float
 ) -> tuple[Cell, int]:
     """Draw where an obstacle appears and at which step."""
     if not free:
         raise ValueError(f"no free cell is left for another obstacle ({len(taken)} are taken or kept free)")
     spots = [spot for spot in range(1, len(way)) if way[spot] not in taken]
-    if stream.uniform() < ON_THE_WAY and spots:
+    if stream.uniform() < on_way and spots:
         spot = stream.choose(spots)
         # A way may pass a cell twice: an obstacle never appears where the robot then stands.
         before = [step for step in range(max(0, spot - FARTHEST), spot) if way[step] != way[spot]]

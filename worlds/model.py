@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
+from functools import cached_property
 from typing import Self
 
 import numpy as np
@@ -142,10 +143,24 @@ class TransitionModel:
         return np.unique(self.outcomes[mask, action][occurs])
 
     def beginning(self, starts: NDArray[np.bool_]) -> Self:
-        """Return the same world with other starts, shape (states,), bool."""
+        """Return the same world with other starts, shape (states,), bool.
+
+        Examples
+        --------
+        >>> x = StateIndex((Variable("x", (0, 1)),))
+        >>> model = TransitionModel(x, ("go",), np.array([[1], [1]]), np.zeros((2, 1)), np.ones(2, bool))
+        >>> part = model.beginning(np.array([True, False]))
+        >>> part.starts.tolist(), part.whole is model, part.beginning(part.starts).whole is model
+        ([True, False], True, True)
+        """
         found = copy(self)
-        found.starts = starts
+        found.starts, found.whole = starts, self.whole
         return found
+
+    @cached_property
+    def whole(self) -> Self:
+        """The world with all the starts that it was made with: what a task graph is checked against."""
+        return self
 
     def reachable(self, starts: NDArray[np.bool_] | None = None) -> NDArray[np.bool_]:
         """Return the states that some action sequence may reach from `starts`, shape (states,)."""

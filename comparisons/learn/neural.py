@@ -40,8 +40,7 @@ class NeuralRun:
     @property
     def settings(self) -> Mapping[str, bool | int | float | str]:
         """The config, by name, but for what the learner does not read."""
-        config = asdict(self.learner.config)
-        return {name: value for name, value in config.items() if name not in self.learner.unread}
+        return _read(type(self.learner), self.learner.config)
 
     def learn(self) -> Pieces:
         """Learn, update by update."""
@@ -83,28 +82,54 @@ def flat_dqn(request: Request) -> NeuralRun:
     return _flat(FlatDQN, request)
 
 
+def flat_ppo_settings(given: Mapping[str, str]) -> dict[str, bool | int | float | str]:
+    """Return the settings of flat PPO by name, with the given ones in place of the defaults."""
+    return _read(FlatPPO, _flat_config(FlatPPO, "flat-ppo", None, given))
+
+
+def flat_dqn_settings(given: Mapping[str, str]) -> dict[str, bool | int | float | str]:
+    """Return the settings of flat DQN by name, with the given ones in place of the defaults."""
+    return _read(FlatDQN, _flat_config(FlatDQN, "flat-dqn", None, given))
+
+
 def _flat(kind: type[Flat], request: Request) -> NeuralRun:
-    """Return a run of a flat learner, its network wide unless its width is given.
+    """Return a run of a flat learner."""
+    config = _flat_config(kind, request.learner, request.config, request.settings)
+    torch.set_num_threads(1)
+    return NeuralRun(kind(request.grounded, request.seed, _for_steps(config, request)))
+
+
+def _flat_config(
+    kind: type[Flat], learner: str, path: Path | None, given: Mapping[str, str]
+) -> OptionCriticConfig:
+    """Return what a flat learner learns with, its network wide unless its width is given.
 
     In a file, which may be meant for several learners, settings that it does not read are let be.
     """
-    for name in request.settings:
+    for name in given:
         if name in kind.unread:
-            given = "--terminations" if name == "terminations" else f"--set {name}"
+            option = "--terminations" if name == "terminations" else f"--set {name}"
             read = [field.name for field in fields(OptionCriticConfig) if field.name not in kind.unread]
             raise UserError(
-                f"{given}: the learner {request.learner} has no use for {name}; leave it out. "
+                f"{option}: the learner {learner} has no use for {name}; leave it out. "
                 f"Its settings are {', '.join(read)}"
             )
-    config = _config(request)
-    if "hidden" not in request.settings and not _sets(request.config, "hidden"):
+    config = load_config(path, given)
+    if "hidden" not in given and not _sets(path, "hidden"):
         config = replace(config, hidden=WIDTH)
-    torch.set_num_threads(1)
-    return NeuralRun(kind(request.grounded, request.seed, config))
+    return config
+
+
+def _read(kind: type[CollectingLearner], config: OptionCriticConfig) -> dict[str, bool | int | float | str]:
+    """Return what a learner reads of a config, by name."""
+    return {name: value for name, value in asdict(config).items() if name not in kind.unread}
 
 
 def _config(request: Request) -> OptionCriticConfig:
-    config = load_config(request.config, request.settings)
+    return _for_steps(load_config(request.config, request.settings), request)
+
+
+def _for_steps(config: OptionCriticConfig, request: Request) -> OptionCriticConfig:
     return config if request.steps is None else replace(config, total=request.steps)
 
 

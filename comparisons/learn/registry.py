@@ -32,12 +32,18 @@ _OURS: Final = {
     "flat-ppo": "comparisons.learn.neural:flat_ppo",
     "flat-dqn": "comparisons.learn.neural:flat_dqn",
     "maxq-0": "comparisons.learn.tabular:maxq_0",
+    "maxq-q": "comparisons.learn.tabular:maxq_q",
+    "hsmq": "comparisons.learn.tabular:hsmq",
     "flat-q": "comparisons.learn.tabular:flat_q",
 }
 
 
 # Those that can begin with another one's networks.
 _CARRYING: Final = ("option-critic",)
+
+
+class StuckError(UserError):
+    """Learning cannot go on: an episode does not end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,8 +128,8 @@ def learner_names() -> tuple[str, ...]:
 
     Examples
     --------
-    >>> learner_names()[:5]
-    ('option-critic', 'flat-ppo', 'flat-dqn', 'maxq-0', 'flat-q')
+    >>> learner_names()[:7]
+    ('option-critic', 'flat-ppo', 'flat-dqn', 'maxq-0', 'maxq-q', 'hsmq', 'flat-q')
     """
     return tuple(_points())
 

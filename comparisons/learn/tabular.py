@@ -1,81 +1,116 @@
-"""Compiled tabular learners as runs of `affordant learn`."""
+"""Tabular learners as runs of `affordant learn`: compiled where they can be, readable otherwise."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from dataclasses import asdict, replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from comparisons.learn.registry import Pieces, Request
-from planners import EpisodeTooLongError, Exploration, HarmonicRate, Learner, LearningRate, Settings
-from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ
+from comparisons.learn.greedy_tables import greedy_tables
+from comparisons.learn.registry import Pieces, Request, StuckError
+from planners import HSMQ, EpisodeTooLongError, FlatQ, Learner, MaxQ, MaxQQ
+from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ, CompiledMaxQQ
 from planners.compiled.resuming import restore, state_of
 from planners.option_critic.arrays import refuse_foreign
 from planners.option_critic.greedy import GreedyPolicy
-from planners.option_critic.options import NONE, Options, compile_options
-from worlds.errors import UserError
+from planners.option_critic.options import compile_options
+from planners.tabular_config import load_tabular_config
 
-_TOTAL: Final = 1_000_000  # steps, unless said otherwise
-_FIRST: Final = 100  # episodes of the first piece; each next one has a fifth of those before
-_HALF: Final = 300  # episodes of a task after which every second choice is random
-_SLOW: Final = 1000  # episodes after which the rate is a half, where there is chance
+_COMPILED: Final[Mapping[type[Learner], type[Compiled[Any]]]] = {
+    MaxQ: CompiledMaxQ,
+    MaxQQ: CompiledMaxQQ,
+    FlatQ: CompiledFlatQ,
+}
+_COUNTED: Final = range(1 << 62)
 
-Row = NDArray[np.int64]
 
+class TabularRun(ABC):
+    """A run of a tabular learner on a whole graph, from every start of its world."""
 
-class TabularRun:
-    """A run of a compiled learner on a whole graph, from every start of its world.
-
-    The rate is 1 on a deterministic world, where nothing needs averaging, and falls harmonically elsewhere.
-    """
-
-    def __init__(self, kind: type[Compiled[Any]], request: Request) -> None:
-        for given, what in ((request.config, "--config"), (request.settings, "--set and --terminations")):
-            if given:
-                raise UserError(
-                    f"--learner {request.learner} has no settings to give by {what}; leave them out, "
-                    "or use the option-critic"
-                )
+    def __init__(self, request: Request) -> None:
+        config = load_tabular_config(request.config, request.settings)
+        self.config = config if request.steps is None else replace(config, total=request.steps)
         self.grounded = request.grounded
         model = request.grounded.model
-        rate = LearningRate(1.0, 1.0, 1) if model.is_deterministic else HarmonicRate(_SLOW)
-        self.total = _TOTAL if request.steps is None else request.steps
-        settings = Settings(rate=rate, exploration=Exploration(_HALF))
-        self.learner = kind(request.grounded, [(request.seed,)], settings, threads=1)
+        self._settings = self.config.settings(deterministic=model.is_deterministic)
         terminal = request.grounded.nodes[request.grounded.root].terminal
         self.starts = np.flatnonzero(model.starts & ~terminal).tolist()
-        self.options = compile_options(self.learner.grounded)
 
     @property
     def settings(self) -> Mapping[str, bool | int | float | str]:
-        """What it learns with: the rate's and the exploration's schedules, and the steps."""
-        rate, exploration = self.learner.settings.rate, self.learner.settings.exploration
-        return {"rate": str(rate), "exploration": str(exploration), "total": self.total}
+        """The config, by name."""
+        return asdict(self.config)
+
+    @property
+    @abstractmethod
+    def steps(self) -> int:
+        """Steps so far."""
+
+    @property
+    @abstractmethod
+    def episodes(self) -> int:
+        """Episodes of the root so far."""
+
+    @abstractmethod
+    def _train(self, episodes: int) -> float:
+        """Go on for so many episodes; return their mean length."""
+
+    @abstractmethod
+    def greedy(self) -> GreedyPolicy:
+        """Return the greedy policy."""
+
+    @abstractmethod
+    def state(self) -> Mapping[str, NDArray[np.generic]]:
+        """Return tables, schedules' episodes and streams."""
+
+    @abstractmethod
+    def restore(self, state: Mapping[str, NDArray[np.generic]], /) -> None:
+        """Take up a state."""
+
+    def learn(self) -> Pieces:
+        """Learn, each piece as long as the config wants evaluations to be apart."""
+        while self.steps < self.config.total:
+            try:
+                length = self._train(self.config.piece(self.episodes))
+            except EpisodeTooLongError as error:
+                raise StuckError(f"{error}; give the learner a graph that ends, or another seed") from error
+            yield self.steps, {"episode_length": length}
+
+    def due(self) -> bool:
+        """Return True: pieces are as long as evaluations are far apart."""
+        return True
+
+
+class CompiledRun(TabularRun):
+    """A run of a compiled learner."""
+
+    def __init__(self, kind: type[Compiled[Any]], request: Request) -> None:
+        super().__init__(request)
+        self.learner = kind(request.grounded, [(request.seed,)], self._settings, threads=1)
+        self.options = compile_options(self.learner.grounded)
+        self._asked = self.learner.run(0)  # it takes a while to make
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return int(self.learner.steps[0])
 
     @property
     def episodes(self) -> int:
         """Episodes of the root so far."""
         return int(self.learner.episodes[0, self.learner.grounded.root])
 
-    def learn(self) -> Pieces:
-        """Learn, each piece a fifth longer than all before."""
-        while self.learner.steps[0] < self.total:
-            piece = max(_FIRST, self.episodes // 5)
-            try:
-                steps = self.learner.train(self.learner.grounded.root, self.starts, piece, afresh=False)
-            except EpisodeTooLongError as error:
-                raise UserError(f"{error}; give the learner a graph that ends, or another seed") from error
-            yield int(self.learner.steps[0]), {"episode_length": float(steps.mean())}
-
-    def due(self) -> bool:
-        """Return True: pieces are as long as evaluations are far apart."""
-        return True
+    def _train(self, episodes: int) -> float:
+        steps = self.learner.train(self.learner.grounded.root, self.starts, episodes, afresh=False)
+        return float(steps.mean())
 
     def greedy(self) -> GreedyPolicy:
         """Return the greedy policy."""
-        return greedy_tables(self.learner.run(0), self.options)
+        return greedy_tables(self.learner.run(0, self._asked), self.options)
 
     def state(self) -> Mapping[str, NDArray[np.generic]]:
         """Return tables, schedules' episodes and streams."""
@@ -83,81 +118,95 @@ class TabularRun:
 
     def restore(self, state: Mapping[str, NDArray[np.generic]], /) -> None:
         """Take up a state."""
-        counted = range(1 << 62)
-        bounds = dict.fromkeys(("episodes", "steps", "learning", "following"), counted)
+        bounds = dict.fromkeys(("episodes", "steps", "learning", "following"), _COUNTED)
         refuse_foreign(state, state_of(self.learner), bounds)
         restore(self.learner, state)
 
 
+class ReadableRun(TabularRun):
+    """A run of a readable learner: of HSMQ, which is not compiled, and of any that learns at all states."""
+
+    def __init__(self, kind: type[Learner], request: Request) -> None:
+        super().__init__(request)
+        self.learner = kind(request.grounded, (request.seed,), self._settings)
+        self.options = compile_options(self.learner.grounded)
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return self.learner.steps
+
+    @property
+    def episodes(self) -> int:
+        """Episodes of the root so far."""
+        return self.learner.episodes[self.learner.grounded.root]
+
+    def _train(self, episodes: int) -> float:
+        steps = self.learner.train(self.learner.grounded.root, self.starts, episodes, afresh=False)
+        return float(np.mean(steps))
+
+    def greedy(self) -> GreedyPolicy:
+        """Return the greedy policy."""
+        return greedy_tables(self.learner, self.options)
+
+    def state(self) -> Mapping[str, NDArray[np.generic]]:
+        """Return tables, schedules' episodes and streams."""
+        learner = self.learner
+        counts = {
+            "episodes": np.array(learner.episodes, dtype=np.int64),
+            "steps": np.array([learner.steps], dtype=np.int64),
+            "learning": np.array([learner.random.drawn], dtype=np.int64),
+            "following": np.array([learner.chance.drawn], dtype=np.int64),
+        }
+        return {"values": np.concatenate([np.array(row) for row in _rows(learner)]), **counts}
+
+    def restore(self, state: Mapping[str, NDArray[np.generic]], /) -> None:
+        """Take up a state."""
+        bounds = dict.fromkeys(("episodes", "steps", "learning", "following"), _COUNTED)
+        refuse_foreign(state, self.state(), bounds)
+        learner, values, at = self.learner, state["values"].tolist(), 0
+        for row in _rows(learner):
+            row[:] = values[at : at + len(row)]
+            at += len(row)
+        learner.episodes[:] = state["episodes"].tolist()
+        learner.steps = int(state["steps"][0])
+        learner.random.drawn = int(state["learning"][0])
+        learner.chance.drawn = int(state["following"][0])
+
+
 def maxq_0(request: Request) -> TabularRun:
     """Return a run of MAXQ-0."""
-    return TabularRun(CompiledMaxQ, request)
+    return _run(MaxQ, request)
+
+
+def maxq_q(request: Request) -> TabularRun:
+    """Return a run of MAXQ-Q."""
+    return _run(MaxQQ, request)
+
+
+def hsmq(request: Request) -> TabularRun:
+    """Return a run of HSMQ."""
+    return _run(HSMQ, request)
 
 
 def flat_q(request: Request) -> TabularRun:
     """Return a run of flat Q-learning."""
-    return TabularRun(CompiledFlatQ, request)
+    return _run(FlatQ, request)
 
 
-def greedy_tables(learner: Learner, options: Options) -> GreedyPolicy:
-    """Return what a tabular learner would do in every state, as tables over its graph's options.
-
-    Control comes back as far as tasks on top of the stack have ended, and each caller then takes its best
-    child, down to a primitive action.
-
-    Examples
-    --------
-    >>> from hierarchy import ground, two_rooms
-    >>> from planners import MaxQ
-    >>> from worlds import maze_model, parse_layout
-    >>> rows = "grid", ". . : D1 G1", "T1 . | . .", "start 0,0", "trigger T1", "goal G1"
-    >>> maze = parse_layout(chr(10).join(rows))
-    >>> grounded = ground(two_rooms(maze), maze_model(maze))
-    >>> learner = MaxQ(grounded, seed=(0,))
-    >>> start = grounded.model.index.number((maze.start, maze.triggers["T1"], maze.goals["G1"], "closed"))
-    >>> _ = learner.train(grounded.root, [start], episodes=300)
-    >>> greedy_tables(learner, compile_options(grounded)).returns(np.array([start]))
-    array([-5.])
-    """
-    best = _best_children(learner)
-    states, count = options.grounded.model.index.size, len(options)
-    places = {tuple(edge.child for edge in stack): k for k, stack in enumerate(options.stacks)}
-    anew: dict[tuple[int, ...], Row] = {(): _chosen((), options.grounded.root, best, places)}
-    option = np.empty((states, count + 1), dtype=np.int64)
-    for k, stack in enumerate(options.stacks):
-        option[:, k] = k
-        for level in reversed(range(len(stack))):  # what ends further down counts more
-            below = tuple(edge.child for edge in stack[:level])
-            if below not in anew:
-                anew[below] = _chosen(below, stack[level].caller, best, places)
-            back = options.ended[:, level : len(stack), k].all(axis=1) & (anew[below] != NONE)
-            option[:, k] = np.where(back, anew[below], option[:, k])
-    option[:, count] = np.maximum(anew[()], 0)  # nothing is chosen where the root has ended
-    tops = [stack[-1].child for stack in options.stacks]
-    action = np.stack([np.maximum(best.get(top, np.full(states, top)), 0) for top in tops], axis=1)
-    return GreedyPolicy(options, option, action)
+def _run(kind: type[Learner], request: Request) -> TabularRun:
+    """Return a run, compiled if the learner is and if it does not learn at all states."""
+    all_states = load_tabular_config(request.config, request.settings).all_states
+    if kind in _COMPILED and not all_states:
+        return CompiledRun(_COMPILED[kind], request)
+    return ReadableRun(kind, request)
 
 
-def _best_children(learner: Learner) -> dict[int, Row]:
-    """Return the best child of every task in every state, by the task's place; `NONE` where it ended."""
-    found = {}
-    for place, node in enumerate(learner.grounded.nodes):
-        if node.calls:
-            best = np.full(node.terminal.size, NONE)
-            for state in np.flatnonzero(~node.terminal).tolist():
-                if learner.choices(place, state):
-                    best[state] = node.calls[learner.greedy(place, state)].child
-            found[place] = best
-    return found
-
-
-def _chosen(
-    below: tuple[int, ...], caller: int, best: Mapping[int, Row], places: Mapping[tuple[int, ...], int]
-) -> Row:
-    """Return the option that begins in every state when a caller on top of `below` has control."""
-    found = np.full(len(best[caller]), NONE)
-    for child in np.unique(best[caller][best[caller] != NONE]).tolist():
-        stack = (*below, child)
-        option = places[stack] if stack in places else _chosen(stack, child, best, places)
-        found = np.where(best[caller] == child, option, found)
-    return found
+def _rows(learner: Learner) -> list[list[float]]:
+    """Return all that a learner has learnt: the very lists, in one order."""
+    if isinstance(learner, HSMQ):
+        return [row for tables in learner.table for row in tables]
+    assert isinstance(learner, MaxQ), "these are the two families of tables"
+    completions = [row for tables in learner.completion for row in tables]
+    inner = learner.inner_completion if isinstance(learner, MaxQQ) else []
+    return [*completions, *learner.reward, *(row for tables in inner for row in tables)]

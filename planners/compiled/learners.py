@@ -216,9 +216,12 @@ class Compiled(ABC, Generic[L]):
         self._heed(self._share(follow, steps.size))
         return steps
 
-    def run(self, number: int) -> L:
-        """Return a reference learner that has learnt what a run has, and would go on as it does."""
-        learner = self._reference(number)
+    def run(self, number: int, into: L | None = None) -> L:
+        """Return a reference learner that has learnt what a run has, and would go on as it does.
+
+        It is the one that is given, which this has returned before for the same run, or a new one.
+        """
+        learner = self._reference(number) if into is None else into
         self._fill(learner, self.values[number])
         learner.episodes = self.episodes[number].tolist()
         learner.steps = int(self.steps[number])

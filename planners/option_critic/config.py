@@ -7,52 +7,31 @@ those that differ.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Final, Literal, get_args, get_type_hints
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, TypeAdapter, ValidationError
 
-from hierarchy.text_files import file_text
-from hierarchy.text_nodes import Document, Fault, TaskGraphTextError, read_yaml
-from worlds import UserError, suggest
+from planners.config_text import (
+    Count,
+    Positive,
+    Share,
+    Size,
+    Weight,
+    check_fields,
+    load_settings,
+    parse_settings,
+    read_settings,
+)
 
 Ends = Literal["given", "learnt", "prior"]
 """What ends a task: the graph; a learnt termination; a learnt one that the graph's is a prior of."""
-Size = Annotated[int, Field(ge=1, le=100_000)]
-Count = Annotated[int, Field(ge=1, le=10**12)]
-Share = Annotated[float, Field(ge=0, le=1)]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 DEFAULTS: Final = "option_critic.yaml"
 """The file of the defaults, beside this module."""
-_MENDS: Final = {
-    Ends: f"use one of {', '.join(get_args(Ends))}",
-    bool: "give true or false",
-    Size: "give a whole number from 1 to 100000",
-    Count: "give a whole number from 1 to 1000000000000",
-    Share: "give a number from 0 to 1",
-    Positive: "give a number above 0",
-    Weight: "give a number from 0 on",
-}
-
-
-class ConfigError(UserError):
-    """A file of settings is wrong; `faults` tells where.
-
-    Examples
-    --------
-    >>> str(ConfigError("mine.yaml", [Fault(2, "rte", "there is no such setting", "did you mean 'rate'?")]))
-    "mine.yaml, line 2, rte: there is no such setting; did you mean 'rate'?"
-    """
-
-    def __init__(self, source: str, faults: list[Fault]) -> None:
-        self.faults = tuple(sorted(faults))
-        super().__init__("\n".join(f"{source}, {fault}" for fault in self.faults))
 
 
 @dataclass(frozen=True)
@@ -130,12 +109,7 @@ class OptionCriticConfig:
     evaluate: Count = 2
 
     def __post_init__(self) -> None:
-        for name, adapter in _FIELDS.items():
-            value = getattr(self, name)
-            try:
-                adapter.validate_python(value, strict=True)
-            except ValidationError as error:
-                raise UserError(f"{name}: {value!r} is not possible; {_mend(name, value)}") from error
+        check_fields(self)
 
     @property
     def per_update(self) -> int:
@@ -154,10 +128,6 @@ class OptionCriticConfig:
         """Return about what an episode is worth in a world of some rewards, for critics to be scaled by."""
         steps = 0.4 / (1 - min(self.gamma, 0.999))
         return steps * float(np.abs(rewards).mean())
-
-
-_TYPES: Final = get_type_hints(OptionCriticConfig, include_extras=True)
-_FIELDS: Final = {field.name: TypeAdapter[Any](_TYPES[field.name]) for field in fields(OptionCriticConfig)}
 
 
 def load_config(
@@ -188,17 +158,12 @@ def load_config(
         ...
     worlds.errors.UserError: gama=0.9: there is no such setting; did you mean 'gamma'?
     """
-    values: dict[str, Any] = {}
-    for name, text in (overrides or {}).items():
-        found = _read(name, text)
-        if isinstance(found, _Wrong):
-            raise UserError(f"{name}={text}: {found.problem}; {found.mend}")
-        values[name] = found.value
+    given = overrides or {}
     if path is None:
         text = files("planners.option_critic").joinpath(DEFAULTS).read_text(encoding="utf-8")
-        return replace(parse_config(text, DEFAULTS), **values)
+        return read_settings(parse_config(text, DEFAULTS), given)
     missing = "there is no such file; check the path, or copy planners/option_critic/option_critic.yaml"
-    return replace(parse_config(file_text(Path(path), missing), str(path)), **values)
+    return load_settings(OptionCriticConfig(), path, given, missing)
 
 
 def parse_config(text: str, source: str = "the settings") -> OptionCriticConfig:
@@ -223,60 +188,6 @@ def parse_config(text: str, source: str = "the settings") -> OptionCriticConfig:
     >>> parse_config("gamma: 0.9\nhiden: 64", "mine.yaml")
     Traceback (most recent call last):
         ...
-    planners.option_critic.config.ConfigError: mine.yaml, line 2, hiden: there is no such setting; did ...
+    planners.config_text.ConfigError: mine.yaml, line 2, hiden: there is no such setting; did you ...
     """
-    lines = (line.partition("#")[0].strip() for line in text.splitlines())
-    if not any(line and line != "---" for line in lines):
-        return OptionCriticConfig()  # all is left out
-    try:
-        document = read_yaml(text, source)
-    except TaskGraphTextError as error:
-        raise ConfigError(source, list(error.faults)) from error
-    if not isinstance(document.data, dict):
-        fault = document.fault((), "these are no settings", "write NAME: VALUE in each line")
-        raise ConfigError(source, [fault])
-    return OptionCriticConfig(**_settings(document, source))
-
-
-@dataclass(frozen=True)
-class _Right:
-    value: Any
-
-
-@dataclass(frozen=True)
-class _Wrong:
-    problem: str
-    mend: str
-
-
-def _settings(document: Document, source: str) -> dict[str, Any]:
-    values: dict[str, Any] = {}
-    faults = []
-    for name, text in document.data.items():
-        found = _read(name, text)
-        if isinstance(found, _Wrong):
-            faults.append(document.fault((name,), found.problem, found.mend))
-        else:
-            values[name] = found.value
-    if faults:
-        raise ConfigError(source, faults)
-    return values
-
-
-def _read(name: str, text: Any) -> _Right | _Wrong:
-    """Return the value that a setting's text stands for, or what is wrong with it."""
-    if name not in _FIELDS:
-        return _Wrong("there is no such setting", suggest(name, _FIELDS))
-    if not isinstance(text, str):
-        return _Wrong("this is no single value", _mend(name, text))
-    try:
-        return _Right(_FIELDS[name].validate_python(text))
-    except ValidationError:
-        return _Wrong(f"{text or 'nothing'} is not possible", _mend(name, text))
-
-
-def _mend(name: str, value: Any) -> str:
-    kind = _TYPES[name]
-    if kind == Ends and isinstance(value, str):
-        return suggest(value, get_args(Ends))
-    return _MENDS[kind]
+    return parse_settings(OptionCriticConfig(), text, source)

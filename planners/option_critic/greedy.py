@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,8 +81,35 @@ class GreedyPolicy:
         found: NDArray[np.float64] = values[starts * columns + columns - 1]
         return found
 
+    def returns_within(self, starts: NDArray[np.int64], limit: int) -> NDArray[np.float64]:
+        """Return the expected undiscounted reward of the first so many steps, shape (starts,).
+
+        It is finite, whether the policy ends or not; where nothing may be chosen there is nothing to earn.
+        """
+        first, kernel, rewards, live, _ = self._chain(starts)
+        places = np.flatnonzero(_reached(kernel, first, live.size))
+        inside, earned = kernel[places][:, places], rewards[places]
+        values = np.zeros(places.size)
+        for _ in range(limit):
+            values = earned + inside @ values
+        found: NDArray[np.float64] = values[np.searchsorted(places, first)]
+        return found
+
     def _solved(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Solve for the value of every state and running option that can be reached."""
+        first, kernel, rewards, live, over = self._chain(starts)
+        reached = _reached(kernel, first, live.size)
+        sure = surely_ends(kernel, live, over)
+        inside = np.flatnonzero(sure & reached)
+        values = np.where(over, 0.0, -np.inf)
+        if inside.size:
+            system = csc_array(eye_array(inside.size) - kernel[inside][:, inside])
+            values[inside] = splu(system).solve(rewards[inside])
+        found: NDArray[np.float64] = values[first]
+        return found
+
+    def _chain(self, starts: NDArray[np.int64]) -> _Chain:
+        """Return the policy as a chain over states and running options, one after the other."""
         grounded, columns = self.options.grounded, self.option.shape[1]
         model, ended = grounded.model, grounded.nodes[grounded.root].terminal
         joint = np.arange(self.option.size)
@@ -94,13 +122,20 @@ class GreedyPolicy:
         occurs = chances > 0  # an entry of 0 would count as a way to go
         rows = np.broadcast_to(joint[:, None], to.shape)[occurs]
         kernel = csr_array((chances[occurs], (rows, to[occurs])), shape=(joint.size, joint.size))
-        first = starts * columns + columns - 1
-        reached = may_come_to(csr_array(kernel.T), np.ones_like(live), np.isin(joint, first))
-        sure = surely_ends(kernel, live, over)
-        inside = np.flatnonzero(sure & reached)
-        values = np.where(over, 0.0, -np.inf)
-        if inside.size:
-            system = csc_array(eye_array(inside.size) - kernel[inside][:, inside])
-            values[inside] = splu(system).solve(rewards[inside])
-        found: NDArray[np.float64] = values[first]
-        return found
+        return _Chain(starts * columns + columns - 1, kernel, rewards, live, over)
+
+
+class _Chain(NamedTuple):
+    """A policy as a chain: where it begins, its chances and rewards, where it goes on, where it is over."""
+
+    first: NDArray[np.int64]
+    kernel: csr_array[np.float64]
+    rewards: NDArray[np.float64]
+    live: NDArray[np.bool_]
+    over: NDArray[np.bool_]
+
+
+def _reached(kernel: csr_array[np.float64], first: NDArray[np.int64], size: int) -> NDArray[np.bool_]:
+    """Return which places of a chain it may come to, shape (size,)."""
+    everywhere = np.ones(size, dtype=np.bool_)
+    return may_come_to(csr_array(kernel.T), everywhere, np.isin(np.arange(size), first))

@@ -147,7 +147,7 @@ def compile_options(grounded: GroundGraph) -> Options:
     UserError
         If the masks would take more than 4 GB.
     """
-    checked(grounded.graph, grounded.model)
+    checked(grounded.graph, grounded.model.whole)
     stacks = tuple(_stacks(grounded, grounded.root, ()))
     nodes, primitives = grounded.nodes, len(grounded.model.actions)
     levels, states = max(map(len, stacks)), grounded.model.index.size

@@ -17,10 +17,11 @@ import pytest
 
 from comparisons.cli import main
 from comparisons.learn import registry
+from comparisons.learn.greedy_tables import greedy_tables
 from comparisons.learn.line import Line, Measured
 from comparisons.learn.neural import NeuralRun
 from comparisons.learn.registry import Request, learner_names, new_run
-from comparisons.learn.tabular import TabularRun, greedy_tables
+from comparisons.learn.tabular import TabularRun
 from hierarchy import ground
 from hierarchy.check import checked
 from hierarchy.text import load_graph, load_world
@@ -31,7 +32,7 @@ from worlds import UserError
 
 MAZE = "grid\n. . : D1 G1\nT1 . | . .\n. . : D2 .\nstart 0,0\ntrigger T1\ngoal G1\n"
 QUICK = ("--set", "num_envs=16", "horizon=16", "hidden=8", "minibatch=100", "max_steps=20")
-OURS = ("option-critic", "flat-ppo", "flat-dqn", "maxq-0", "flat-q")
+OURS = ("option-critic", "flat-ppo", "flat-dqn", "maxq-0", "maxq-q", "hsmq", "flat-q")
 FILES = ("checkpoint.json", "checkpoint.safetensors", "curve.csv")
 
 
@@ -222,7 +223,7 @@ def test_a_folder_that_stays_empty_is_taken_away(
         ),
         (
             ("two_rooms", "--out", "x", "--learner", "maxq"),
-            "--learner maxq: there is none; did you mean 'maxq-0'?",
+            "--learner maxq: there is none; did you mean 'maxq-q'?",
         ),
         (("two_rooms", "--out", "x", "--world", "tax"), "did you mean 'taxi'?"),
         (("two_rooms", "--out", "x", "--config", "no.yaml"), "no.yaml: there is no such file"),
@@ -238,7 +239,14 @@ def test_a_folder_that_stays_empty_is_taken_away(
         (("two_rooms", "--out", "x", "--seed", "-1"), "--seed -1: give a whole number"),
         (("two_rooms", "--out", "x", "--tolerance", "nan"), "--tolerance nan: give a number from 0 on"),
         (("two_rooms", "--out", "x", "--resume"), "leave --resume out to begin"),
-        (("two_rooms", "--out", "x", "--learner", "flat-q", "--terminations", "prior"), "has no settings"),
+        (
+            ("two_rooms", "--out", "x", "--learner", "flat-q", "--terminations", "prior"),
+            "terminations=prior: there is no such setting; use one of gamma, ",
+        ),
+        (
+            ("two_rooms", "--out", "x", "--learner", "hsmq", "--set", "explores=boltzman"),
+            "explores=boltzman: boltzman is not possible; did you mean 'boltzmann'?",
+        ),
         (("two_rooms", "--out", "x", "--lerner", "flat-q"), "Did you mean --learner"),
         (
             ("two_rooms", "--out", "x", "--learner", "flat-ppo", "--terminations", "prior"),
@@ -280,7 +288,7 @@ def test_another_run_is_not_gone_on_with(capsys: pytest.CaptureFixture[str]) -> 
     other.write_text(graph.replace("uses: [robot]", "uses: [robot, goal]", 1))
     for more, expected in (
         (("--seed", "3"), "begun with --seed 0, not 3; give the same, or another --out"),
-        (("--learner", "maxq-0"), "maxq-0 has no settings"),
+        (("--learner", "maxq-0"), "num_envs=16: there is no such setting"),
         (("--terminations", "prior"), "begun with setting terminations given, not prior"),
         (("--world", "two_rooms"), "begun with --world small.maze, not two_rooms"),
     ):

@@ -6,6 +6,7 @@ from hypothesis import given, settings
 from option_runs import NAMES, allowed, choices, chooses_actions, named, sound_graphs
 
 from hierarchy import Call, GroundGraph, Param, TaskGraph, TaskGraphError, Var, ground
+from hierarchy.starts import beginning_where
 from planners import stack_problem
 from planners.option_critic import options as module
 from planners.option_critic.options import NONE, Options, compile_options
@@ -176,3 +177,11 @@ def test_values_go_by_completions_and_rewards() -> None:
     assert options.names == ("Go(0)", "Go(3)", "left", "right")
     uses = {part.name: part.uses for part in options.parts}
     assert (uses["V Go(3)"], uses["V left"], uses["V right"]) == (("x", "wind"), (), ("wind",))
+
+
+def test_fewer_starts_leave_the_options_as_they_are() -> None:
+    """With one trigger and one goal the other tasks can never run, which is no fault of the graph's."""
+    whole = named("two_rooms")
+    part = beginning_where(whole, "trigger = T1 and goal = G2")
+    assert part.model.starts.sum() == 31
+    assert compile_options(part).names == compile_options(whole).names
