@@ -20,6 +20,7 @@ from comparisons.study.plates_kinds import (
     gaps_map_plate,
     reliability_plate,
     steps_map_plate,
+    ways_plate,
 )
 from comparisons.study.rows import Row
 
@@ -36,6 +37,7 @@ MAKERS: Final[Mapping[str, Maker]] = {
     "counterexample": counterexample_plate,
     "steps_map": steps_map_plate,
     "gaps_map": gaps_map_plate,
+    "ways": ways_plate,
     "reliability": reliability_plate,
 }
 """What draws each figure."""

@@ -32,6 +32,7 @@ FIGURES: Final = (
     "counterexample",
     "steps_map",
     "gaps_map",
+    "ways",
     "reliability",
 )
 """Names of all figures, in a report's order."""

@@ -268,8 +268,23 @@ def _heat(layout: Layout, grounded: GroundGraph, policy: GreedyPolicy | None) ->
             "cells": [str(cell) for cell in at],
             "steps": [float(-value) if np.isfinite(value) else None for value in returns],
             "gaps": [float(gap) if np.isfinite(gap) else None for gap in best - returns],
+            "way": _way(layout, grounded, policy),
         }
     }
+
+
+def _way(layout: Layout, grounded: GroundGraph, policy: GreedyPolicy | None) -> list[str]:
+    """Return the cells that the policy passes in the layout's own example; none if it does not arrive."""
+    index, column = grounded.model.index, grounded.model.index.names.index("robot")
+    trigger, goal = layout.triggers[layout.trigger], layout.goals[layout.goal]
+    if policy is None or not grounded.model.is_deterministic:
+        return []
+    route = policy.route(index.number((layout.start, trigger, goal, "closed")))
+    if not route:
+        return []
+    state, _, action = route[-1]
+    states = [*(step[0] for step in route), int(grounded.model.successors[state, action])]
+    return [str(index.state(state)[column]) for state in states]
 
 
 def _cells(layout: Layout, grounded: GroundGraph) -> list[Cell]:

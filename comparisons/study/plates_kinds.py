@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from comparisons.study.figure_counterexample import draw as draw_counterexample
 from comparisons.study.figures_heat import Heat, heat_figure
 from comparisons.study.figures_reliability import Bins, reliability_figure
+from comparisons.study.figures_ways import Ways, ways_figure
 from comparisons.study.grouping import MOST_PANELS, About, Sides, curve_sides, grouped
 from comparisons.study.judging import smallest
 from comparisons.study.plate import Number, Plate, seeds_of, without_blanks
 from comparisons.study.rows import Row
 from comparisons.study.statistics import aggregate
-from worlds import Cell, parse_layout
+from worlds import Cell, Layout, parse_layout
 
 _HEAT: Final = "heat"
 _RELIABILITY: Final = "reliability"
@@ -34,7 +35,41 @@ def gaps_map_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     return _map_plate("gaps_map", "gaps", what, about, rows)
 
 
-def _map_plate(name: str, column: str, what: str, about: About, rows: Sequence[Row]) -> Plate | None:
+def ways_plate(about: About, rows: Sequence[Row]) -> Plate | None:
+    """Return the ways that learnt policies take in the layout's own example; None if runs keep none."""
+    kept = _maps(about, rows)
+    if kept is None or len(kept.panels) > MOST_PANELS:
+        return None
+    panels = {
+        title: Ways(title, [[_cell(cell) for cell in one["way"]] for one in maps])
+        for title, maps in kept.panels.items()
+    }
+    if not any(ways.arrived for ways in panels.values()):
+        return None
+    figure = ways_figure(kept.layout, list(panels.values()), [kept.layout.marks[m] for m in kept.marks])
+    caption = (
+        f"Ways of the learnt policies of {seeds_of(rows, about)} from the start to trigger {kept.marks[0]} "
+        f"and goal {kept.marks[1]} (framed): the wider a line, the more runs go there."
+    )
+    numbers = [
+        (title, str(here), str(there), 100 * share)
+        for title, ways in panels.items()
+        for (here, there), share in ways.shares().items()
+    ]
+    return Plate("ways", figure, caption, *without_blanks(("panel", "from", "to", "runs, %"), numbers))
+
+
+class _Maps(NamedTuple):
+    """What runs keep of one maze: panel by panel the maps of all its runs."""
+
+    layout: Layout
+    marks: tuple[str, str]
+    cells: tuple[str, ...]
+    panels: dict[str, list[Mapping[str, Any]]]
+
+
+def _maps(about: About, rows: Sequence[Row]) -> _Maps | None:
+    """Return the maps of all runs; None unless all keep one of the same maze."""
     maps = [row.result.details[_HEAT] for row in rows if row.result.details.get(_HEAT)]
     places = {(m["layout"], m["trigger"], m["goal"], tuple(m["cells"])) for m in maps}
     if len(places) != 1 or len(maps) < len(rows):
@@ -42,17 +77,25 @@ def _map_plate(name: str, column: str, what: str, about: About, rows: Sequence[R
     ((text, trigger, goal, cells),) = places
     sides = Sides((), (), tuple(f for f, labels in about.factors.items() if len(labels) > 1))
     panels = {
-        title: _middle([row.result.details[_HEAT] for row in found[""][""]], column)
+        title: [row.result.details[_HEAT] for row in found[""][""]]
         for title, found in grouped(rows, about, sides).items()
     }
+    return _Maps(parse_layout(text), (trigger, goal), cells, panels)
+
+
+def _map_plate(name: str, column: str, what: str, about: About, rows: Sequence[Row]) -> Plate | None:
+    kept = _maps(about, rows)
+    if kept is None:
+        return None
+    panels = {title: _middle(maps, column) for title, maps in kept.panels.items()}
     alike = len({tuple(values) for values in panels.values()}) == 1
     if alike:
         panels = {"every combination": next(iter(panels.values()))} if len(panels) > 1 else panels
     if len(panels) > MOST_PANELS or (column == "gaps" and not any(any(values) for values in panels.values())):
         return None
-    layout = parse_layout(text)
-    ring = [layout.marks[mark] for mark in (trigger, goal)]
-    at = [_cell(cell) for cell in cells]
+    layout, (trigger, goal) = kept.layout, kept.marks
+    ring = [layout.marks[mark] for mark in kept.marks]
+    at = [_cell(cell) for cell in kept.cells]
     heats = [Heat(title, dict(zip(at, values, strict=True))) for title, values in panels.items()]
     label = {"steps": "steps (median)", "gaps": "return lost (median)"}[column]
     figure = heat_figure(layout, heats, label, colours=column, ring=ring)

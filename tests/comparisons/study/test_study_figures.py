@@ -85,6 +85,7 @@ def learnt(seeds: int = 6) -> tuple[About, list[Row]]:
         heat = {"layout": layout_text(MAZE), "trigger": "T4", "goal": "G2", "cells": cells}
         gaps = [0.0, 0.0, float(never), None if never else 0.0]
         heat |= {"steps": [1.0, 2.0, 3.0, None if never else 4.0], "gaps": gaps}
+        heat["way"] = [] if never else ["0,0", "0,1", "1,1"] if seed % 2 else ["0,0", "1,0", "1,1"]
         measures = {STEPS.name: None if never else steps, SHARE.name: curve["share_optimal"][-1]}
         result = Result(measures, {"learning": curve}, {"heat": heat})
         rows.append(Row({"gamma": gamma, "learner": learner}, seed, f"{gamma}{learner}{seed}", result))
@@ -295,7 +296,7 @@ def test_figures_choose_themselves() -> None:
     """Curves, maps and few levels give one set of figures; a numeric factor and parts give another."""
     found, missing = plates_of(*learnt())
     assert set(named(found)) == {
-        *("estimates", "improvement", "learning", "returns", "efficiency", "steps_map", "gaps_map"),
+        *("estimates", "improvement", "learning", "returns", "efficiency", "steps_map", "gaps_map", "ways"),
     }
     assert missing == ()
     assert set(named(plates_of(*episodes())[0])) == {"over", "parts", "improvement", "profiles"}
@@ -365,6 +366,19 @@ def test_a_map_without_gaps_is_not_drawn() -> None:
         text for axes in four[:4] for text in axes.texts if text.get_text() == "\N{MULTIPLICATION SIGN}"
     ]
     assert len(crosses) == 1
+
+
+def test_ways_tell_how_many_runs_take_them() -> None:
+    """Half of the seeds go one way and half the other; a panel says how many arrive at all."""
+    plate = named(plates_of(*learnt(), ["ways"])[0])["ways"]
+    titles = [axes.get_title(loc="left") for axes in plate.figure.axes]
+    assert [title.rpartition(": ")[2] for title in titles] == [*["6 of 6 runs"] * 3, "0 of 6 runs"]
+    assert {row[1:] for row in plate.numbers} == {
+        *(("0,0", "0,1", 50.0), ("0,1", "1,1", 50.0), ("0,0", "1,0", 50.0), ("1,0", "1,1", 50.0)),
+    }
+    about, rows = learnt()
+    lost = [row for row in rows if row.levels == {"gamma": "0.9", "learner": "flat-q"}]
+    assert plates_of(about, lost, ["ways"]) == ([], ("ways",))
 
 
 def test_a_level_has_the_same_colour_in_every_figure() -> None:
