@@ -60,8 +60,9 @@ def _too_few(sides: Sides, comparison: Comparison) -> str:
     called, seeds = _CALLED[comparison.statistic], counted(comparison.seeds, "seed")
     of = f"{called} of {sides.measure.about}"
     first, second = (_estimate(side, sides.measure) for side in (comparison.first, comparison.second))
+    there = "is" if comparison.seeds == 1 else "are"
     return (
-        f"not ranked, for there are {seeds} and {FEWEST_SEEDS} are needed; {of}: {sides.first} {first}, "
+        f"not ranked, for there {there} {seeds} and {FEWEST_SEEDS} are needed; {of}: {sides.first} {first}, "
         f"{sides.second} {second}"
     )
 
