@@ -19,14 +19,14 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 from side_by_side import machine
 from study_kinds import installed
 
-from comparisons.study.declaration import parse_study
-from comparisons.study.engine_dask import DaskEngine
-from comparisons.study.engine_local import LocalEngine
-from comparisons.study.engines import Engine
-from comparisons.study.index import index
-from comparisons.study.running import Summary, run_study
-from comparisons.study.store import Store
-from comparisons.study.work import Ran
+from comparisons.study.declaring.declaration import parse_study
+from comparisons.study.running.engines import Engine
+from comparisons.study.running.index import index
+from comparisons.study.running.local import LocalEngine
+from comparisons.study.running.on_dask import DaskEngine
+from comparisons.study.running.store import Store
+from comparisons.study.running.study_runs import Summary, run_study
+from comparisons.study.running.work import Ran
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 

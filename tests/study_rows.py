@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from comparisons.study.kinds import Measure, Result
-from comparisons.study.rows import Row
-from comparisons.study.samples import Samples
+from comparisons.study.results.rows import Row
+from comparisons.study.results.samples import Samples
 from comparisons.study.spec import RunSpec
 
 STEPS = Measure("steps_to_optimal", "environment steps until every start is optimal", "steps", "less")

@@ -17,8 +17,8 @@ from worlds.errors import UserError
 
 if TYPE_CHECKING:
     from comparisons.outputs import Track
-    from comparisons.study.engines import Engine
-    from comparisons.study.running import Summary
+    from comparisons.study.running.engines import Engine
+    from comparisons.study.running.study_runs import Summary
 
 study = App(
     name="study",
@@ -63,9 +63,9 @@ def run(
     quick
         Only the first two seeds of each combination, for a first look; resume does the others.
     """
-    from comparisons.study.declaration import load_study
-    from comparisons.study.grouping import check_figures
-    from comparisons.study.running import run_study
+    from comparisons.study.declaring.declaration import load_study
+    from comparisons.study.figures.grouping import check_figures
+    from comparisons.study.running.study_runs import run_study
 
     declared = load_study(file)
     check_figures(declared.figures)
@@ -94,7 +94,7 @@ def resume(
     engine, scheduler, workers, limit
         As of `affordant study run`; another engine gives the same results.
     """
-    from comparisons.study.running import resume_study
+    from comparisons.study.running.study_runs import resume_study
 
     with _progress() as track:
         done = resume_study(directory, _engine(engine, scheduler, workers), limit=limit, track=track)
@@ -151,8 +151,8 @@ def export(directory: Path, /, *, out: Path) -> int:
     out
         The file: .csv, or .parquet (extra "parquet").
     """
-    from comparisons.study.exporting import export as write
     from comparisons.study.gathering import study_in
+    from comparisons.study.results.exporting import export as write
 
     declared, store = study_in(directory)
     for path in write(declared.expand(), store, out):
@@ -171,8 +171,8 @@ def diff(first: Path, second: Path, /) -> int:
     first, second
         The stores.
     """
-    from comparisons.study.differences import diff as compare
-    from comparisons.study.store import Store
+    from comparisons.study.results.differences import diff as compare
+    from comparisons.study.running.store import Store
 
     stores = Store(first), Store(second)
     for store in stores:
@@ -191,8 +191,8 @@ def check(file: Path, /) -> int:
     file
         The study file.
     """
-    from comparisons.study.declaration import load_study
-    from comparisons.study.grouping import check_figures
+    from comparisons.study.declaring.declaration import load_study
+    from comparisons.study.figures.grouping import check_figures
 
     declared = load_study(file)
     check_figures(declared.figures)
@@ -203,7 +203,7 @@ def check(file: Path, /) -> int:
 @study.command
 def schema() -> int:
     """Print the JSON Schema of study files, for editors and other programs."""
-    from comparisons.study.schema import shipped_schema
+    from comparisons.study.declaring.schema import shipped_schema
 
     print(shipped_schema(), end="")
     return 0
@@ -226,12 +226,12 @@ def _progress() -> Iterator[Track]:
 def _engine(name: Literal["local", "dask"], scheduler: str | None, workers: int | None) -> Engine:
     """Return the engine that is asked for."""
     if name == "dask":
-        from comparisons.study.engine_dask import DaskEngine
+        from comparisons.study.running.on_dask import DaskEngine
 
         return DaskEngine(scheduler, workers)
     if scheduler is not None:
         raise UserError(f"--scheduler {scheduler}: only the engine dask has one; add --engine dask")
-    from comparisons.study.engine_local import LocalEngine
+    from comparisons.study.running.local import LocalEngine
 
     return LocalEngine(workers)
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from comparisons.study.declaration import Planned, Study
-from comparisons.study.records import DamagedError
-from comparisons.study.rows import Row
-from comparisons.study.running import study_of
-from comparisons.study.store import Damaged, Failure, Store
-from comparisons.study.tables import Table
+from comparisons.study.declaring.declaration import Planned, Study
+from comparisons.study.results.rows import Row
+from comparisons.study.results.tables import Table
+from comparisons.study.running.records import DamagedError
+from comparisons.study.running.store import Damaged, Failure, Store
+from comparisons.study.running.study_runs import study_of
 
 _STATES: Final = ("done", "failed", "damaged", "to do")
 _TOLD: Final = 20

@@ -22,9 +22,9 @@ GROUP: Final = "affordant.runs"
 """The entry points' group."""
 # Reached by name, so that only the kind that is asked for loads its libraries.
 _OURS: Final = {
-    "learn": "comparisons.study.kind_learn:LEARN",
-    "episodes": "comparisons.study.kind_episodes:EPISODES",
-    "perceive": "comparisons.study.kind_perceive:PERCEIVE",
+    "learn": "comparisons.study.runs.learn:LEARN",
+    "episodes": "comparisons.study.runs.episodes:EPISODES",
+    "perceive": "comparisons.study.runs.perceive:PERCEIVE",
 }
 
 

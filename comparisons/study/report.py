@@ -16,14 +16,13 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from comparisons.outputs import Track, new_directory, untracked
 from comparisons.report import inline_picture
-from comparisons.study.answers import answers
-from comparisons.study.choosing import plates_of
-from comparisons.study.declaration import Study
-from comparisons.study.figures import save_three
+from comparisons.study.declaring.declaration import Study
+from comparisons.study.figures.choosing import plates_of
+from comparisons.study.figures.grouping import About, parts_of, shown_measures
+from comparisons.study.figures.plate import Plate, numbers_csv, numbers_table
+from comparisons.study.figures.saving import save_three
 from comparisons.study.gathering import Gathered, gather, state_table, study_in
-from comparisons.study.grouping import About, parts_of, shown_measures
 from comparisons.study.kinds import kind
-from comparisons.study.plate import Plate, numbers_csv, numbers_table
 from comparisons.study.report_parts import (
     cpu_seconds,
     duration,
@@ -35,8 +34,9 @@ from comparisons.study.report_parts import (
     settings_table,
     warnings,
 )
-from comparisons.study.summaries import comparisons_table, study_table
-from comparisons.study.tables import Table
+from comparisons.study.results.answers import answers
+from comparisons.study.results.summaries import comparisons_table, study_table
+from comparisons.study.results.tables import Table
 from comparisons.style import Picture
 from worlds import UserError
 

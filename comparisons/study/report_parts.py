@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
-from comparisons.study.declaration import Study
+from comparisons.study.declaring.declaration import Study
 from comparisons.study.gathering import Gathered
-from comparisons.study.tables import Table
-from comparisons.study.wording import counted
+from comparisons.study.results.tables import Table
+from comparisons.study.results.wording import counted
 
 _FEW: Final = 5  # seeds, below which nothing is ranked
 _SHOWN: Final = 50  # failures that a page tells one by one

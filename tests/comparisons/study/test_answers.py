@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from study_rows import COST, OPTIMAL, RETURN, STEPS, Asked, rows
 
-from comparisons.study.answers import answers
 from comparisons.study.kinds import Measure
-from comparisons.study.rows import Row
-from comparisons.study.summaries import comparisons_table, study_table
+from comparisons.study.results.answers import answers
+from comparisons.study.results.rows import Row
+from comparisons.study.results.summaries import comparisons_table, study_table
 
 
 def wave(level: float, count: int = 20) -> list[float]:
@@ -92,22 +92,22 @@ NEVER = [None] * 12 + [3000.0] * 8
             OPTIMAL,
             {"1": wave(0.9), "12": [share - 0.1 for share in wave(0.9)]},
             "gamma 12 is 10.0 percentage points (95 % 10.0 to 10.0) below gamma 1 in affordances that are"
-            " proved optimal first actions; IQMs of 20 seeds each, paired, p < 0.0001.",
+            " proved optimal first actions: 79.6 % against 89.6 %; IQMs of 20 seeds each, paired, p < 0.0001.",
         ),
         (
             OPTIMAL,
             {"1": wave(0.8), "12": [0.75 + 0.01 * (seed % 5) for seed in range(20)]},
             # 0.797 and 0.77 by hand.
             "gamma 12 is 2.68 percentage points (95 % -0.64 to 6.12) below gamma 1 in affordances that are "
-            "proved optimal first actions; the interval takes in no difference, yet pair by pair one side is "
-            "ahead; IQMs of 20 seeds each, paired, p = 0.035.",
+            "proved optimal first actions: 77.0 % against 79.7 %; the interval takes in no difference, yet pair "
+            "by pair one side is ahead; IQMs of 20 seeds each, paired, p = 0.035.",
         ),
         (
             OPTIMAL,
             {"1": [None] * 4 + [0.5] * 6, "12": [0.75] * 10},
             "gamma 12 is 25.0 percentage points (95 % 25.0 to 25.0) above gamma 1 in affordances that are"
-            " proved optimal first actions; IQMs of 6 seeds each, paired, p = 0.031; 4 runs left out for "
-            "want of a twin; 4 runs had nothing to tell.",
+            " proved optimal first actions: 75.0 % against 50.0 %; IQMs of 6 seeds each, paired, p = 0.031; "
+            "4 runs left out for want of a twin; 4 runs had nothing to tell.",
         ),
         (
             RETURN,

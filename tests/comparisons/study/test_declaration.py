@@ -13,12 +13,13 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.study import checking, kinds
-from comparisons.study.declaration import Answer, Study, StudyError, load_study, parse_study
+from comparisons.study import kinds
+from comparisons.study.declaring import checking
+from comparisons.study.declaring.declaration import Answer, Study, StudyError, load_study, parse_study
+from comparisons.study.declaring.schema import StudyText, json_schema, read_form, shipped_schema
+from comparisons.study.declaring.written import LAST_SEED, value_of
 from comparisons.study.kinds import Kind, Measure, Result
-from comparisons.study.schema import StudyText, json_schema, read_form, shipped_schema
 from comparisons.study.spec import RunSpec, Value
-from comparisons.study.written import LAST_SEED, value_of
 from hierarchy.text_nodes import LARGEST, read_yaml
 from worlds import UserError, suggest
 

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from study_rows import Kept, Shelf
 
-from comparisons.study.differences import Difference, diff
 from comparisons.study.kinds import Result
+from comparisons.study.results.differences import Difference, diff
 from comparisons.study.spec import RunSpec
 
 

@@ -15,12 +15,12 @@ import pytest
 from study_kinds import abort, installed, spec
 from study_processes import alive, kill, parent_of, under_way, wait_until
 
-from comparisons.study.engine_dask import DaskEngine
-from comparisons.study.engine_local import LocalEngine
-from comparisons.study.engines import Engine
-from comparisons.study.processes import Worker
+from comparisons.study.running.engines import Engine
+from comparisons.study.running.local import LocalEngine
+from comparisons.study.running.on_dask import DaskEngine
+from comparisons.study.running.processes import Worker
+from comparisons.study.running.work import Broke, Finished, Ran
 from comparisons.study.spec import RunSpec
-from comparisons.study.work import Broke, Finished, Ran
 from worlds import UserError
 
 BAD = ("raise", "nan", "die", "exit", "hang")
@@ -118,7 +118,7 @@ def test_a_worker_killed_from_outside_loses_nothing(marks: Path) -> None:
 
 def test_workers_that_die_as_they_start_are_a_users_error(monkeypatch: pytest.MonkeyPatch) -> None:
     """It would go on for ever otherwise."""
-    monkeypatch.setattr("comparisons.study.processes._serve", abort)
+    monkeypatch.setattr("comparisons.study.running.processes._serve", abort)
     with (
         LocalEngine(1) as engine,
         pytest.raises(UserError, match="worker processes die as they start: it was ended by SIGABRT"),
@@ -277,7 +277,7 @@ def test_dask_workers_elsewhere_and_one_of_them_killed(tmp_path: Path, marks: Pa
 
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:
     """Told before anything is made, with how to start one."""
-    monkeypatch.setattr("comparisons.study.engine_dask._PATIENCE", 0.5)
+    monkeypatch.setattr("comparisons.study.running.on_dask._PATIENCE", 0.5)
     with (
         pytest.raises(UserError, match=r"tcp://127.0.0.1:9: no scheduler .* `dask scheduler`"),
         DaskEngine("tcp://127.0.0.1:9"),

@@ -11,8 +11,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from study_rows import Kept, Planned, Shelf
 
-from comparisons.study.exporting import Columns, csv_bytes, curve_columns, export, parquet_bytes, run_columns
 from comparisons.study.kinds import Result
+from comparisons.study.results.exporting import (
+    Columns,
+    csv_bytes,
+    curve_columns,
+    export,
+    parquet_bytes,
+    run_columns,
+)
 from comparisons.study.spec import RunSpec
 from worlds import UserError
 

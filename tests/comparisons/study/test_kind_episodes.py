@@ -13,14 +13,14 @@ from comparisons.dynamic import Tally, judge, random_episode
 from comparisons.eyes import Sight
 from comparisons.learning import PairLearner
 from comparisons.robot import Encounter, Robot
-from comparisons.study.declaration import load_study
-from comparisons.study.episode_settings import complete, files
-from comparisons.study.figure_counterexample import draw
-from comparisons.study.judging import Count, Judged, Ledger, Once, counterexample_data, judged, smallest
-from comparisons.study.kind_episodes import EPISODES, run
+from comparisons.study.declaring.declaration import load_study
+from comparisons.study.figures.draw_counterexample import draw
 from comparisons.study.kinds import Result
+from comparisons.study.running.work import Ran, work
+from comparisons.study.runs.episode_settings import complete, files
+from comparisons.study.runs.episodes import EPISODES, run
+from comparisons.study.runs.judging import Count, Judged, Ledger, Once, counterexample_data, judged, smallest
 from comparisons.study.spec import RunSpec
-from comparisons.study.work import Ran, work
 from hierarchy import checked, two_rooms
 from perception.truth import Truth
 from planners import Affordance, LocalRule, Replanner, Replanning, Strategy

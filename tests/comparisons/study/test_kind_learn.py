@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 from comparisons.learn.line import Line
 from comparisons.learn.registry import Request, new_run
 from comparisons.learn.tabular import CompiledRun, TabularRun
-from comparisons.study.declaration import load_study
-from comparisons.study.kind_learn import LEARN, Goals, first_for_good
-from comparisons.study.kind_learn_problem import problem, stored_values
-from comparisons.study.kind_learn_settings import LearnSettings, split
+from comparisons.study.declaring.declaration import load_study
 from comparisons.study.kinds import Result, kind
+from comparisons.study.running.work import Ran, work
+from comparisons.study.runs.learn import LEARN, Goals, first_for_good
+from comparisons.study.runs.learn_problem import problem, stored_values
+from comparisons.study.runs.learn_settings import LearnSettings, split
 from comparisons.study.spec import RunSpec, Value
-from comparisons.study.work import Ran, work
 from hierarchy.abstraction_counts import table_sizes
 from planners import flat_optimum
 from worlds import UserError

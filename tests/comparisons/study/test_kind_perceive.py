@@ -7,11 +7,11 @@ import pytest
 
 from comparisons.learnt import frame_backend
 from comparisons.perception_study import look, score
-from comparisons.study import kind_perceive
-from comparisons.study.declaration import load_study
-from comparisons.study.kind_perceive import PERCEIVE, complete, files, run
+from comparisons.study.declaring.declaration import load_study
+from comparisons.study.running.work import Broke, Ran, work
+from comparisons.study.runs import perceive as kind_perceive
+from comparisons.study.runs.perceive import PERCEIVE, complete, files, run
 from comparisons.study.spec import RunSpec
-from comparisons.study.work import Broke, Ran, work
 from perception.corruptions import corrupt
 from perception.pushed import pushed_frames
 from perception.variation import CLEAN, Variation

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata, wilcoxon
 from study_rows import COST, OPTIMAL, RETURN, STEPS, samples
 
-from comparisons.study.paired import compare, correct, holm, paired_gaps, signed_rank
-from comparisons.study.samples import Samples
-from comparisons.study.statistics import estimate
+from comparisons.study.results.paired import compare, correct, holm, paired_gaps, signed_rank
+from comparisons.study.results.samples import Samples
+from comparisons.study.results.statistics import estimate
 
 CASES = 300
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from comparisons.study.declaration import Planned, Study, parse_study
+from comparisons.study.declaring.declaration import Planned, Study, parse_study
 from comparisons.study.kinds import Result
 from comparisons.study.report import PAGE, report_study
-from comparisons.study.store import Store
-from comparisons.study.work import Broke, Finished, Ran
+from comparisons.study.running.store import Store
+from comparisons.study.running.work import Broke, Finished, Ran
 from worlds import UserError
 
 EVIL = "<script>alert('&')</script>"

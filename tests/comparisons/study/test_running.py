@@ -17,22 +17,22 @@ import pytest
 from study_kinds import installed
 from study_processes import alive, kill, under_way, wait_until
 
-from comparisons.study.declaration import Study, parse_study
-from comparisons.study.engine_dask import DaskEngine
-from comparisons.study.engine_local import LocalEngine
-from comparisons.study.engines import Engine
-from comparisons.study.index import index
-from comparisons.study.lock import held
-from comparisons.study.running import Summary, resume_study, run_study, study_of
-from comparisons.study.store import Store
+from comparisons.study.declaring.declaration import Study, parse_study
+from comparisons.study.running.engines import Engine
+from comparisons.study.running.index import index
+from comparisons.study.running.local import LocalEngine
+from comparisons.study.running.lock import held
+from comparisons.study.running.on_dask import DaskEngine
+from comparisons.study.running.store import Store
+from comparisons.study.running.study_runs import Summary, resume_study, run_study, study_of
 from worlds import UserError
 
 DRIVER = """
 import resource, sys
 from pathlib import Path
-from comparisons.study.declaration import parse_study
-from comparisons.study.engine_local import LocalEngine
-from comparisons.study.running import resume_study, run_study
+from comparisons.study.declaring.declaration import parse_study
+from comparisons.study.running.local import LocalEngine
+from comparisons.study.running.study_runs import resume_study, run_study
 from worlds import UserError
 
 what, out, text, largest = sys.argv[1:]
@@ -334,7 +334,7 @@ def test_a_store_that_cannot_be_begun(tmp_path: Path, monkeypatch: pytest.Monkey
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("comparisons.study.store._write", full)
+    monkeypatch.setattr("comparisons.study.running.store._write", full)
     with pytest.raises(UserError, match=r"cannot be written .No space left on device.; name another"):
         run_study(study(1), tmp_path / "out", LocalEngine(1))
     assert not [path for path in tmp_path.iterdir() if "out" in path.name]

@@ -11,11 +11,10 @@ from study_rows import COST, OPTIMAL, RETURN, STEPS, Kept, Planned, Shelf, rows,
 
 from comparisons.intervals import wilson
 from comparisons.study.kinds import Result
-from comparisons.study.resampling import expanded_tail, inner, resampled
-from comparisons.study.rows import Row, missing_of, rows_of
-from comparisons.study.samples import Samples, refuse_few, samples_of, worst
-from comparisons.study.spec import RunSpec
-from comparisons.study.statistics import (
+from comparisons.study.results.resampling import expanded_tail, inner, resampled
+from comparisons.study.results.rows import Row, missing_of, rows_of
+from comparisons.study.results.samples import Samples, refuse_few, samples_of, worst
+from comparisons.study.results.statistics import (
     STATISTICS,
     aggregate,
     checked_statistic,
@@ -24,6 +23,7 @@ from comparisons.study.statistics import (
     profile,
     share_reached,
 )
+from comparisons.study.spec import RunSpec
 from worlds import UserError
 
 CASES = 300

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from comparisons.study import index as indexing
-from comparisons.study.index import Entry, index
 from comparisons.study.kinds import Result
-from comparisons.study.lock import held
-from comparisons.study.records import DamagedError, checked_record, record
+from comparisons.study.running import index as indexing
+from comparisons.study.running.index import Entry, index
+from comparisons.study.running.lock import held
+from comparisons.study.running.records import DamagedError, checked_record, record
+from comparisons.study.running.store import Store
+from comparisons.study.running.work import Broke, Finished, Ran
 from comparisons.study.spec import RunSpec
-from comparisons.study.store import Store
-from comparisons.study.work import Broke, Finished, Ran
 from worlds import UserError
 
 SPEC = RunSpec("learn", 1, {"gamma": 0.99, "graph": "mein größtes"}, 3, {"a.yaml": "tasks:\r\n"})
@@ -190,7 +190,7 @@ def test_an_older_format_is_read_where_it_is_known(store: Store, monkeypatch: py
     with pytest.raises(UserError, match="format 0, which no affordant has ever written"):
         store.read(SPEC.hash)
     renew = {0: lambda data: {**data, "details": {"renewed": True}}}
-    monkeypatch.setattr("comparisons.study.records._RENEWED", renew)
+    monkeypatch.setattr("comparisons.study.running.records._RENEWED", renew)
     assert store.read(SPEC.hash).result.details == {"renewed": True}
 
 

@@ -13,7 +13,7 @@ import pytest
 from study_kinds import installed
 
 from comparisons.cli import main
-from comparisons.study.declaration import parse_study
+from comparisons.study.declaring.declaration import parse_study
 
 TEXT = """\
 study: sums

@@ -14,30 +14,33 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.stats import trim_mean
 
-from comparisons.study import (
-    figures_curves,
-    figures_estimates,
-    figures_heat,
-    figures_reliability,
-)
-from comparisons.study.choosing import MAKERS, plates_of
-from comparisons.study.curves import iqm_bands, step_aligned
-from comparisons.study.figures import FORMATS, ONE_COLUMN, TWO_COLUMNS, Spot, marks, save_three, scale_of
-from comparisons.study.figures_curves import Curve, Curves, convergence_figure, profiles_figure
-from comparisons.study.figures_estimates import (
+from comparisons.study.figures import draw_curves, draw_estimates, draw_heat, draw_reliability
+from comparisons.study.figures.choosing import MAKERS, plates_of
+from comparisons.study.figures.curves import iqm_bands, step_aligned
+from comparisons.study.figures.draw_curves import Curve, Curves, convergence_figure, profiles_figure
+from comparisons.study.figures.draw_estimates import (
     Estimates,
     estimates_figure,
     improvement_matrix_figure,
     over_figure,
 )
-from comparisons.study.figures_heat import Heat, heat_figure
-from comparisons.study.figures_reliability import Bins, reliability_figure
-from comparisons.study.grouping import FIGURES, About
+from comparisons.study.figures.draw_heat import Heat, heat_figure
+from comparisons.study.figures.draw_reliability import Bins, reliability_figure
+from comparisons.study.figures.grouping import FIGURES, About
+from comparisons.study.figures.plate import Plate
+from comparisons.study.figures.saving import (
+    FORMATS,
+    ONE_COLUMN,
+    TWO_COLUMNS,
+    Spot,
+    marks,
+    save_three,
+    scale_of,
+)
 from comparisons.study.kinds import Kind, Measure, Result
-from comparisons.study.plate import Plate
-from comparisons.study.rows import Row
-from comparisons.study.samples import samples_of
-from comparisons.study.statistics import estimate
+from comparisons.study.results.rows import Row
+from comparisons.study.results.samples import samples_of
+from comparisons.study.results.statistics import estimate
 from worlds import Cell, UserError, load_layout
 from worlds.layout_writing import layout_text
 
@@ -134,7 +137,7 @@ def test_the_same_data_gives_the_same_three_files(name: str, tmp_path: Path) -> 
     assert (tmp_path / "one" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
 
 
-@pytest.mark.parametrize("module", [figures_curves, figures_estimates, figures_heat, figures_reliability])
+@pytest.mark.parametrize("module", [draw_curves, draw_estimates, draw_heat, draw_reliability])
 def test_every_figure_is_drawn_here(module: ModuleType) -> None:
     """A new figure function joins the test of equal bytes."""
     found = {name.removesuffix("_figure") for name in vars(module) if name.endswith("_figure")}

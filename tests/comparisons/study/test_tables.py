@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from study_rows import COST, OPTIMAL, STEPS, Asked, rows
 
-from comparisons.study.answers import answers
-from comparisons.study.summaries import comparisons_table, study_table
-from comparisons.study.tables import Table
-from comparisons.study.wording import decimals_of, number, plain, spread
+from comparisons.study.results.answers import answers
+from comparisons.study.results.summaries import comparisons_table, study_table
+from comparisons.study.results.tables import Table
+from comparisons.study.results.wording import decimals_of, number, plain, spread
 
 HOSTILE = 'a|b `c` *d* _e_ [f](g) <script>&amp;$h$\\ "i" ~j~\nk'
 DASH = "\N{EN DASH}"

@@ -12,9 +12,9 @@ import pytest
 from study_kinds import KIND, installed, spec
 
 from comparisons.study.kinds import Result
-from comparisons.study.provenance import git_state
+from comparisons.study.running.provenance import git_state
+from comparisons.study.running.work import Broke, Ran, checked_result, work
 from comparisons.study.spec import RunSpec
-from comparisons.study.work import Broke, Ran, checked_result, work
 
 
 @pytest.fixture(autouse=True)

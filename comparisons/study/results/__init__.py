@@ -1,0 +1,1 @@
+"""What runs found, summed up: statistics, answers, tables, exports, differences."""
