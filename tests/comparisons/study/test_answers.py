@@ -92,15 +92,16 @@ NEVER = [None] * 12 + [3000.0] * 8
             OPTIMAL,
             {"1": wave(0.9), "12": [share - 0.1 for share in wave(0.9)]},
             "gamma 12 is 10.0 percentage points (95 % 10.0 to 10.0) below gamma 1 in affordances that are"
-            " proved optimal first actions: 79.6 % against 89.6 %; IQMs of 20 seeds each, paired, p < 0.0001.",
+            " proved optimal first actions: 79.6 % against 89.6 %; IQMs of 20 seeds each, paired, "
+            "p < 0.0001.",
         ),
         (
             OPTIMAL,
             {"1": wave(0.8), "12": [0.75 + 0.01 * (seed % 5) for seed in range(20)]},
             # 0.797 and 0.77 by hand.
             "gamma 12 is 2.68 percentage points (95 % -0.64 to 6.12) below gamma 1 in affordances that are "
-            "proved optimal first actions: 77.0 % against 79.7 %; the interval takes in no difference, yet pair "
-            "by pair one side is ahead; IQMs of 20 seeds each, paired, p = 0.035.",
+            "proved optimal first actions: 77.0 % against 79.7 %; the interval takes in no difference, yet "
+            "pair by pair one side is ahead; IQMs of 20 seeds each, paired, p = 0.035.",
         ),
         (
             OPTIMAL,
