@@ -1,4 +1,4 @@
-"""How a command ends when it is told to: in order, with what is half-made taken away."""
+"""How a command ends when it is told to: in order, at once or between two pieces of work."""
 
 from __future__ import annotations
 
@@ -7,6 +7,9 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Final, NoReturn
+
+_SIGNALS: Final = (signal.SIGINT, signal.SIGTERM)
 
 
 @contextmanager
@@ -39,3 +42,62 @@ def orderly_exit() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGTERM, signal.SIG_DFL if before is None else before)
+
+
+class Told:
+    """Whether the program was told to stop: false until then.
+
+    Attributes
+    ----------
+    number
+        The signal that told it; None until then.
+    """
+
+    def __init__(self) -> None:
+        self.number: int | None = None
+
+    def __bool__(self) -> bool:
+        return self.number is not None
+
+    def obey(self) -> NoReturn:
+        """End as the signal would have ended it: by KeyboardInterrupt (130), or by SystemExit (143)."""
+        if self.number == signal.SIGTERM:
+            raise SystemExit(128 + signal.SIGTERM)
+        raise KeyboardInterrupt
+
+
+@contextmanager
+def told_to_stop() -> Iterator[Told]:
+    """Let Ctrl-C and SIGTERM be noted rather than break in; a second one breaks in as ever.
+
+    Elsewhere than on the main thread, which alone gets signals, nothing is ever noted.
+
+    Examples
+    --------
+    >>> from os import getpid, kill
+    >>> with told_to_stop() as told:
+    ...     before = bool(told)
+    ...     kill(getpid(), signal.SIGINT)
+    ...     print(before, bool(told))
+    False True
+    """
+    told = Told()
+    if threading.current_thread() is not threading.main_thread():
+        yield told
+        return
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+
+    def back() -> None:
+        for number, handler in before.items():
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)
+
+    def note(number: int, _frame: object) -> None:
+        told.number = number
+        back()
+
+    for number in _SIGNALS:
+        signal.signal(number, note)
+    try:
+        yield told
+    finally:
+        back()

@@ -20,8 +20,8 @@ from comparisons.learn.line import Line, Measured
 from comparisons.learn.logging_to import Log, logging_to
 from comparisons.learn.registry import Carry, Request, Run, new_run
 from comparisons.learn.spec import Spec
-from comparisons.learn.stopping import told_to_stop
 from comparisons.outputs import refuse_existing
+from comparisons.stopping import told_to_stop
 from hierarchy import GroundGraph
 from hierarchy.check import checked
 from hierarchy.starts import beginning_where

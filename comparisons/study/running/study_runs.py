@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from comparisons.learn.stopping import Told, told_to_stop
 from comparisons.outputs import Track, refuse_existing, untracked
+from comparisons.stopping import Told, told_to_stop
 from comparisons.study.declaring.declaration import Study, parse_study
 from comparisons.study.running.engines import Engine
 from comparisons.study.running.index import index
