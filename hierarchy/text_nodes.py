@@ -10,6 +10,7 @@ import yaml
 
 from hierarchy.graph import TaskGraphError
 from hierarchy.text_words import shortened
+from worlds import UserError
 
 Path = tuple[str | int, ...]
 """Keys and places in lists that lead to a part of a document."""
@@ -52,15 +53,8 @@ class Fault:
         return f"{at}: {self.problem}; {self.mend}"
 
 
-class TaskGraphTextError(TaskGraphError):
-    """The text of a task graph is wrong; `faults` tells where, in the order of their lines.
-
-    Examples
-    --------
-    >>> fault = Fault(3, "tasks.Root.untl", "unknown key 'untl'", "did you mean 'until'?")
-    >>> str(TaskGraphTextError("mine.yaml", [fault]))
-    "mine.yaml, line 3, tasks.Root.untl: unknown key 'untl'; did you mean 'until'?"
-    """
+class FaultyTextError(UserError):
+    """A text is wrong; `faults` tells where, in the order of their lines, the message the first of them."""
 
     def __init__(self, source: str, faults: Iterable[Fault]) -> None:
         self.source = source
@@ -68,6 +62,17 @@ class TaskGraphTextError(TaskGraphError):
         lines = [f"{source}, {fault}" for fault in self.faults[:_TOLD]]
         more = len(self.faults) - len(lines)
         super().__init__("\n".join([*lines, f"and {more} more in {source}"] if more else lines))
+
+
+class TaskGraphTextError(FaultyTextError, TaskGraphError):
+    """The text of a task graph is wrong.
+
+    Examples
+    --------
+    >>> fault = Fault(3, "tasks.Root.untl", "unknown key 'untl'", "did you mean 'until'?")
+    >>> str(TaskGraphTextError("mine.yaml", [fault]))
+    "mine.yaml, line 3, tasks.Root.untl: unknown key 'untl'; did you mean 'until'?"
+    """
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from collecting_runs import learnt, same
 from numpy.typing import NDArray
 
 from hierarchy import GroundGraph
 from hierarchy.check import checked
 from hierarchy.text import graph_text, load_graph, load_world
 from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
-from planners.option_critic.collecting import Progress
 from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.loading import load_option_critic
 from planners.option_critic.training import OptionCritic
@@ -23,7 +23,6 @@ MAZE = "grid\n. . : D1 G1\nT1 . | . .\n. . : D2 .\nstart 0,0\ntrigger T1\ngoal G
 SMALL = OptionCriticConfig(
     hidden=8, num_envs=16, horizon=16, epochs=2, minibatch=100, max_steps=20, anneal=4000, total=6 * 256
 )
-State = dict[str, NDArray[np.generic]]
 
 
 @pytest.fixture(scope="module")
@@ -33,25 +32,6 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[GroundGraph, Path]:
     path.write_text(MAZE)
     graph, world = load_graph("two_rooms", load_world(str(path)))
     return checked(graph, world.model()), path
-
-
-def learnt(learner: OptionCritic, updates: int | None = None) -> list[Progress]:
-    """Let a learner make so many updates, or all that are left."""
-    found = []
-    pieces = learner.learn()
-    for progress in pieces:
-        found.append(progress)
-        if len(found) == updates:
-            break
-    pieces.close()  # type: ignore[attr-defined]  # a generator
-    return found
-
-
-def same(one: State, other: State) -> bool:
-    """Return whether two states are equal, bit for bit."""
-    return one.keys() == other.keys() and all(
-        (one[name].dtype, one[name].tobytes()) == (other[name].dtype, other[name].tobytes()) for name in one
-    )
 
 
 @pytest.mark.parametrize("terminations", ["given", "prior"])

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from collecting_runs import State, learnt, same
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -17,7 +18,6 @@ from hierarchy.text import load_graph
 from planners import flat_optimum
 from planners.option_critic import flat_baselines
 from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
-from planners.option_critic.collecting import CollectingLearner, Progress
 from planners.option_critic.config import Ends, OptionCriticConfig
 from planners.option_critic.flat_baselines import Flat, FlatDQN, FlatPPO
 from planners.option_critic.memory import Memory
@@ -52,7 +52,6 @@ OTHERS: dict[str, Any] = {
     "max_steps": 5,
 }
 KINDS = pytest.mark.parametrize("kind", [FlatPPO, FlatDQN])
-State = dict[str, NDArray[np.generic]]
 
 
 @cache
@@ -64,25 +63,6 @@ def world(name: str) -> GroundGraph:
     rows = "grid", ". . : D1 G1", "T1 . | . .", "start 0,0", "trigger T1", "goal G1"
     maze = parse_layout("\n".join(rows))
     return ground(two_rooms(maze), maze_model(maze))
-
-
-def learnt(learner: CollectingLearner, updates: int | None = None) -> list[Progress]:
-    """Let a learner make so many updates, or all that are left."""
-    found = []
-    pieces = learner.learn()
-    for progress in pieces:
-        found.append(progress)
-        if len(found) == updates:
-            break
-    pieces.close()  # type: ignore[attr-defined]  # a generator
-    return found
-
-
-def same(one: State, other: State) -> bool:
-    """Return whether two states are equal, bit for bit."""
-    return one.keys() == other.keys() and all(
-        (one[name].dtype, one[name].tobytes()) == (other[name].dtype, other[name].tobytes()) for name in one
-    )
 
 
 @pytest.mark.parametrize("terminations", ["given", "prior", "learnt"])

@@ -13,15 +13,14 @@ from comparisons.study.declaring.factors import Factor
 from comparisons.study.declaring.schema import Statistic
 from comparisons.study.spec import RunSpec, Value
 from hierarchy.text_files import file_text
-from hierarchy.text_nodes import LARGEST, Fault, TaskGraphTextError, read_yaml
+from hierarchy.text_nodes import LARGEST, Fault, FaultyTextError, TaskGraphTextError, read_yaml
 from worlds import UserError
 
-_TOLD: Final = 12  # mistakes that a message lists
 _LISTED: Final = 12  # seeds that are told one by one
 
 
-class StudyError(UserError):
-    """A study file is wrong; `faults` tells where, in the order of their lines.
+class StudyError(FaultyTextError):
+    """A study file is wrong.
 
     Examples
     --------
@@ -29,13 +28,6 @@ class StudyError(UserError):
     >>> str(StudyError("mine.yaml", [fault]))
     "mine.yaml, line 3, answer.compare: there is no factor 'gama'; did you mean 'gamma'?"
     """
-
-    def __init__(self, source: str, faults: list[Fault]) -> None:
-        self.source = source
-        self.faults = tuple(sorted(faults))
-        lines = [f"{source}, {fault}" for fault in self.faults[:_TOLD]]
-        more = len(self.faults) - len(lines)
-        super().__init__("\n".join([*lines, f"and {more} more in {source}"] if more else lines))
 
 
 @dataclass(frozen=True)
