@@ -7,6 +7,7 @@ from typing import Final
 
 from hierarchy.text_nodes import LARGEST
 from worlds import UserError
+from worlds.files import read_bytes
 
 _MARKS: Final = {b"\xff\xfe": "UTF-16", b"\xfe\xff": "UTF-16", b"\x89PNG": "a picture"}
 """How files begin that are no UTF-8 text, and what they are."""
@@ -37,20 +38,7 @@ def file_text(path: Path, missing: str) -> str:
     ...     file_text(path, "there is no such file; write one")
     'graph: mine'
     """
-    try:
-        if path.is_dir():
-            raise UserError(f"{path}: this is a folder; name a file in it")
-        if not path.exists():
-            raise UserError(f"{path}: {missing}")
-        if not path.is_file():
-            raise UserError(f"{path}: this is no ordinary file; copy what it holds into one")
-        if path.stat().st_size > _MOST:
-            raise UserError(f"{path}: the file is larger than {_MOST} bytes; split the task graph")
-        content = path.read_bytes()
-    except OSError as error:
-        raise UserError(
-            f"{path}: it cannot be read ({error.strerror}); check the path and its rights"
-        ) from error
+    content = read_bytes(path, _MOST, missing)
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

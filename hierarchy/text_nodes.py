@@ -121,7 +121,7 @@ def read_yaml(text: str, source: str) -> Document:
     try:
         if len(text) > LARGEST:
             problem = f"the text has {len(text)} characters, more than {LARGEST}"
-            raise _refused(source, 1, problem, "split the task graph")
+            raise _refused(source, 1, problem, "split it")
         _refuse_specials(text, source)
         node = yaml.compose(text, Loader=yaml.SafeLoader)
     except yaml.MarkedYAMLError as error:

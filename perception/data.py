@@ -23,7 +23,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from perception.pushed import COLUMNS, PushedFrames, pushed_frames
 from perception.variation import CLEAN, Variation
 from worlds import UserError
-from worlds.tensor_file import replace_file
+from worlds.files import replace_file
 
 __all__ = [
     "CLEAN",

@@ -17,23 +17,15 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, Field, TypeAdapter
 
 from worlds import UserError
-from worlds.tensor_file import (
-    MOST_BYTES,
-    Cards,
-    Tensors,
-    named,
-    read_bytes,
-    read_tensors,
-    replace_files,
-    tensor_bytes,
-)
+from worlds.files import read_bytes, replace_files
+from worlds.tensor_file import MOST_BYTES, Cards, Tensors, named, read_tensors, tensor_bytes
 
 __all__ = ["FORMAT", "MOST_BYTES", "Card", "Share", "Tensors", "installed", "load_model", "save_model"]
 
 FORMAT: Final = 1
 """The version of the card's form that is written and read."""
 _MOST_CARD: Final = 1 << 16  # characters, or bytes of the copy
-_MISSING: Final = "check the path, or train the backend first"
+_MISSING: Final = "there is no such file; check the path, or train the backend first"
 Share = Annotated[float, Field(ge=0, le=1)]
 
 

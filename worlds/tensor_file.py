@@ -1,4 +1,4 @@
-"""Arrays on disk as safetensors, with words in the header: written whole or not at all, read with care.
+"""Arrays on disk as safetensors, with words in the header: read with care.
 
 Such a file holds numbers and text, nothing that is ever executed. A card among the words tells what it is of:
 `perception.models` and `planners.option_critic.checkpoint` say what stands on theirs.
@@ -7,9 +7,7 @@ Such a file holds numbers and text, nothing that is ever executed. A card among 
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final, Generic, NamedTuple, Protocol, TypeVar
@@ -21,6 +19,7 @@ from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from worlds.errors import UserError
+from worlds.files import read_bytes
 
 MOST_BYTES: Final = 256 << 20
 """A file may be so large."""
@@ -156,7 +155,7 @@ def read_tensors(path: Path, missing: str, most: int = MOST_BYTES) -> TensorFile
     path
         The file.
     missing
-        What to do where there is none.
+        What to say where there is none: the problem and a mend.
     most
         Bytes that it may have.
 
@@ -195,58 +194,6 @@ def native(path: Path, name: str, tensor: NDArray[Any]) -> NDArray[Any]:
     if tensor.dtype.kind == "f" and not np.isfinite(tensor).all():
         raise UserError(f"{path}: tensor {name!r} holds numbers that are not finite; train it anew")
     return np.asarray(tensor, dtype=tensor.dtype.newbyteorder("="), order="C")
-
-
-def read_bytes(path: Path, most: int, missing: str) -> bytes:
-    """Return what an ordinary file of at most `most` bytes holds, or raise a `UserError`."""
-    try:
-        if not path.exists():
-            raise UserError(f"{path}: there is no such file; {missing}")
-        if not path.is_file():
-            raise UserError(f"{path}: this is no ordinary file; name one")
-        with path.open("rb") as file:
-            content = file.read(most + 1)
-    except OSError as error:
-        raise UserError(
-            f"{path}: it cannot be read ({error.strerror}); check the path and its rights"
-        ) from error
-    if len(content) > most:
-        raise UserError(
-            f"{path}: the file is larger than {most} bytes; it holds something else than is looked for"
-        )
-    return content
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Write a file beside and move it into place, so that no reader ever sees half of it."""
-    new = path.with_name(f".{path.name}.{os.getpid()}.new")
-    try:
-        with new.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        new.replace(path)
-    finally:
-        with suppress(FileNotFoundError):
-            new.unlink()
-
-
-def replace_files(contents: Mapping[Path, bytes]) -> None:
-    """Write files of one folder, one after the other; the folder is made if it is missing.
-
-    Raises
-    ------
-    UserError
-        If nothing can be written there; a file is then as it was before.
-    """
-    for path, content in contents.items():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(path, content)
-        except OSError as error:
-            raise UserError(
-                f"{path}: it cannot be written ({error.strerror}); name another folder"
-            ) from error
 
 
 def _words(path: Path, content: bytes) -> dict[str, str]:

@@ -28,7 +28,7 @@ from hierarchy.starts import beginning_where
 from hierarchy.text import graph_text, load_graph, load_world
 from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
 from worlds.errors import UserError
-from worlds.tensor_file import replace_files
+from worlds.files import replace_files
 
 CHECKPOINT: Final = "checkpoint.safetensors"
 CURVE: Final = "curve.csv"

@@ -21,7 +21,8 @@ from pydantic import ConfigDict, Field, TypeAdapter
 
 from hierarchy import GroundGraph
 from worlds import UserError
-from worlds.tensor_file import Cards, Tensors, read_tensors, replace_files, tensor_bytes
+from worlds.files import replace_files
+from worlds.tensor_file import Cards, Tensors, read_tensors, tensor_bytes
 
 FORMAT: Final = 1
 """The version of the card's form that is written and read."""
@@ -177,7 +178,7 @@ def load_checkpoint(path: Path | str) -> Stored:
         If there is no such file, it is too large, broken or of another kind; the message says which.
     """
     path = Path(path)
-    tensors, words = read_tensors(path, "check the path, or learn first")
+    tensors, words = read_tensors(path, "there is no such file; check the path, or learn first")
     about = _CARDS.read(words.get("card"), path)
     if _hash(tensors) != about.sha256:
         raise UserError(f"{path}: the arrays are not those that were written; copy the checkpoint anew")

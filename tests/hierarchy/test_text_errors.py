@@ -174,7 +174,7 @@ def test_the_text_without_mistakes_is_read() -> None:
         ("sets:", "sets: {", "this is no YAML at column"),
         (TEXT, "", "line 1: the text is empty; begin it with 'graph: NAME'"),
         (TEXT, "- graph", "line 1: it is no mapping of keys to values; write keys with values"),
-        (TEXT, "#" * LARGEST + "more", f"more than {LARGEST}; split the task graph"),
+        (TEXT, "#" * LARGEST + "more", f"more than {LARGEST}; split it"),
     ],
 )
 def test_a_mistake_is_told(old: str, new: str, expected: str) -> None:
@@ -352,7 +352,7 @@ def test_editors_ways_to_save_a_file_are_read(tmp_path: Path, encoding: str, end
         (TEXT.encode("utf-16"), r"line 1: .*it looks like UTF-16"),
         (b"\x89PNG\r\n", r"line 1: .*it looks like a picture.*; .* or name another file"),
         (b"graph: a\nworld: \x00", r"line 2: the character U\+0000 cannot stand in a text; remove it"),
-        (b" " * (4 * LARGEST + 1), "larger than 4000000 bytes; split the task graph"),
+        (b" " * (4 * LARGEST + 1), "larger than 4000000 bytes; is it the one"),
     ],
 )
 def test_files_that_are_no_text_are_refused(tmp_path: Path, content: bytes, told: str) -> None:
@@ -375,11 +375,11 @@ def test_what_is_no_file_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         with pytest.raises(UserError, match=told):
             load_graph(path)
 
-    def refuse(path: Path) -> bytes:
-        raise PermissionError(13, "Permission denied", str(path))
+    def refuse(path: Path, mode: str) -> None:
+        raise PermissionError(13, "Permission denied", f"{path}, {mode}")
 
     (tmp_path / "locked.yaml").write_text(TEXT)
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(Path, "open", refuse)
     with pytest.raises(
         UserError, match=r"locked.yaml: it cannot be read \(Permission denied\); check the path"
     ):

@@ -222,7 +222,7 @@ def test_paths_that_lead_to_no_file_are_refused(tmp_path: Path, monkeypatch: pyt
     monkeypatch.setattr(models, "MOST_BYTES", 100)
     for name, problem in {
         "missing.safetensors": "no such file",
-        "folder.safetensors": "no ordinary file",
+        "folder.safetensors": "this is a folder",
         "pipe.safetensors": "no ordinary file",
         "zero.safetensors": "no ordinary file",
         "large.safetensors": "larger than 100 bytes",

@@ -181,7 +181,7 @@ def test_paths_that_lead_to_no_file_are_refused(tmp_path: Path) -> None:
     (tmp_path / "folder.safetensors").mkdir()
     for name, problem in {
         "missing.safetensors": "no such file; check the path, or learn first",
-        "folder.safetensors": "no ordinary file",
+        "folder.safetensors": "this is a folder",
         "pipe.safetensors": "no ordinary file",
         "weights.pt": r"end in \.safetensors",
     }.items():

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from comparisons.study.results.rows import Kept, KeptRuns, Levels, Planned
 from worlds import UserError
-from worlds.tensor_file import replace_files
+from worlds.files import replace_files
 
 Cell = bool | int | float | str | None
 Columns = Mapping[str, Sequence[Cell]]

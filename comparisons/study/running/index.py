@@ -15,7 +15,7 @@ from typing import Any, Final
 from comparisons.study.running.records import DamagedError, checked_record, record
 from comparisons.study.running.store import Store
 from worlds import UserError
-from worlds.tensor_file import replace_file
+from worlds.files import replace_file
 
 _INDEX: Final = "index.json"
 

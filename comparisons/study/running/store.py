@@ -27,13 +27,12 @@ from comparisons.study.running.records import DamagedError, read_record, record
 from comparisons.study.running.work import Finished, Ran, Reason
 from comparisons.study.spec import RunSpec
 from worlds import UserError
-from worlds.tensor_file import replace_file
+from worlds.files import UNFINISHED, replace_file
 
 _STUDY: Final = "study.yaml"
 _RUNS: Final = "runs"
 _FAILURES: Final = "failures"
 _DAMAGED: Final = "damaged"
-_UNFINISHED: Final = ".*.new"  # as `worlds.tensor_file.replace_file` names what is not yet in place
 
 
 @dataclass(frozen=True)
@@ -221,7 +220,7 @@ class Store:
 
     def tidy(self) -> None:
         """Remove what a driver that was killed left half-written; only for whoever holds the store."""
-        for path in self.directory.rglob(_UNFINISHED):
+        for path in self.directory.rglob(UNFINISHED):
             path.unlink(missing_ok=True)
 
     def _run_files(self) -> list[Path]:
