@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from planners.compiled.learners import Compiled
+from planners.compiled.runs import Compiled
 
 
 def state_of(learner: Compiled[Any]) -> dict[str, NDArray[np.generic]]:

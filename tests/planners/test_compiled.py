@@ -18,7 +18,7 @@ from hierarchy import GroundGraph, Param, TaskGraph, checked, ground, two_rooms
 from hierarchy.hdg import hdg_graph
 from hierarchy.taxi import taxi_graph
 from planners import Boltzmann, Exploration, HarmonicRate, LearningRate, Settings
-from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ, CompiledMaxQQ, learners
+from planners.compiled import Compiled, CompiledFlatQ, CompiledMaxQ, CompiledMaxQQ, runs
 from planners.compiled.build import FOLDER, build
 from planners.learner import EpisodeTooLongError
 from planners.maxq import MaxQ
@@ -192,7 +192,7 @@ def test_schedules_grow_with_the_episodes() -> None:
     grounded = wide(4)
     starts = np.flatnonzero(grounded.model.starts).tolist()
     compiled = CompiledMaxQ(grounded, [(1,)])
-    episodes = learners.SCHEDULED + 50
+    episodes = runs.SCHEDULED + 50
     steps = compiled.train(grounded.root, starts, episodes)
     assert steps[0].tolist() == MaxQ(grounded, (1,)).train(grounded.root, starts, episodes)
 
@@ -255,8 +255,10 @@ def test_no_seeds_and_no_starts_are_refused() -> None:
     for call in (lambda task, states: learner.train(task, states, 5), learner.greedy_steps):
         with pytest.raises(UserError, match="task Root has no states to start from"):
             call(grounded.root, [])
-        with pytest.raises(UserError, match="states are numbers from 0 to 2047, not"):
+        with pytest.raises(UserError, match="states are numbers from 0 to 2047, and 2048 is none of them"):
             call(grounded.root, [5, 2048])
+        with pytest.raises(UserError, match="by their numbers; of a mask"):
+            call(grounded.root, grounded.model.starts)
         with pytest.raises(UserError, match="2 is not the place of a task; tasks have the places 4 to 14"):
             call(2, [5])
 
@@ -271,7 +273,7 @@ def test_generated_source_is_the_reference_on_random_graphs(
     grounded = ground(data.draw(graphs(grid)), grid.model)
     explorer = data.draw(st.sampled_from([Exploration(5), Boltzmann(5.0, 0.9, 0.5)]))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(learners, "build", interpreted.interpret)
+        patch.setattr(runs, "build", interpreted.interpret)
         agree(kind, grounded, Settings(gamma=gamma, exploration=explorer), episodes=8)
 
 
@@ -369,7 +371,7 @@ def test_graphs_of_one_form_share_a_kernel(monkeypatch: pytest.MonkeyPatch) -> N
         sources.append(source)
         return build(source)
 
-    monkeypatch.setattr(learners, "build", watched)
+    monkeypatch.setattr(runs, "build", watched)
     rows = "grid", ". . T1 | . G1", ". T2 . : D1 .", "T3 . . : D2 G2", "T4 . . | G3 G4", "start 0,0"
     maze = parse_layout("\n".join((*rows, "trigger T1", "goal G1")))
     small = ground(two_rooms(maze), maze_model(maze))
