@@ -35,7 +35,7 @@ from hierarchy import ground, two_rooms
 from planners import flat_optimum
 from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.flat_baselines import FlatDQN, FlatPPO
-from planners.option_critic.measures import Oracle, degeneracy, termination_table
+from planners.option_critic.measures import Oracle, degeneracy
 from planners.option_critic.options import compile_options
 from planners.option_critic.training import OptionCritic
 from worlds import load_layout, maze_model
@@ -147,8 +147,7 @@ def learn(plan: Plan, seed: int, asked: Cases, oracle: Oracle) -> Result:
     found |= {"unseen": float(optimal[~asked.four].mean()), "seen": float(optimal[asked.four].mean())}
     found["reached"] = int(np.isfinite(returns).sum())
     if isinstance(learner, OptionCritic):
-        beta = termination_table(learner)
-        used = degeneracy(learner.greedy(), asked.states, beta=beta, oracle=oracle)
+        used = degeneracy(learner.greedy(), asked.states, beta=learner.terminations(), oracle=oracle)
         found |= {"options": asdict(used)}
     elif isinstance(learner, TabularRun):
         found |= {"options": asdict(learner.greedy().used(asked.states))}

@@ -213,9 +213,7 @@ class Neural:
 
     def greedy(self, goal: Cell) -> float:
         """Return the exact expected steps of its greedy policy."""
-        with torch.no_grad():
-            option, action = self.learner._greedy(torch.as_tensor(places(goal)))  # noqa: SLF001 - of one goal
-        return expected_steps(goal, option.numpy(), action.numpy())
+        return expected_steps(goal, *self.learner.greedy_in(places(goal)))
 
 
 def measure(run: Run, goal: Cell, episodes: int) -> list[Row]:

@@ -6,7 +6,7 @@ and `parse_settings`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ from typing import (
 from pydantic import Field, TypeAdapter, ValidationError
 
 from hierarchy.text_files import file_text
-from hierarchy.text_nodes import Document, Fault, TaskGraphTextError, read_yaml
+from hierarchy.text_nodes import Document, FaultyTextError, TaskGraphTextError, read_yaml
 from worlds import UserError, suggest
 
 if TYPE_CHECKING:
@@ -43,6 +43,9 @@ Part = Annotated[float, Field(gt=0, le=1)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Weight = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
+Unread = Mapping[tuple[str, str], tuple[str, ...]]
+"""Names of settings that are not read, by the setting and its value that keep them from being read."""
+
 _MENDS: Final = {
     bool: "give true or false",
     str: "give words",
@@ -56,18 +59,8 @@ _MENDS: Final = {
 }
 
 
-class ConfigError(UserError):
-    """A file of settings is wrong; `faults` tells where.
-
-    Examples
-    --------
-    >>> str(ConfigError("mine.yaml", [Fault(2, "rte", "there is no such setting", "did you mean 'rate'?")]))
-    "mine.yaml, line 2, rte: there is no such setting; did you mean 'rate'?"
-    """
-
-    def __init__(self, source: str, faults: Iterable[Fault]) -> None:
-        self.faults = tuple(sorted(faults))
-        super().__init__("\n".join(f"{source}, {fault}" for fault in self.faults))
+class ConfigError(FaultyTextError):
+    """A file of settings is wrong; see `parse_settings`."""
 
 
 def check_fields(config: DataclassInstance) -> None:
@@ -108,7 +101,9 @@ def read_settings(defaults: C, overrides: Mapping[str, str]) -> C:
     return replace(defaults, **_values(type(defaults), overrides))
 
 
-def load_settings(defaults: C, path: str | Path | None, overrides: Mapping[str, str], missing: str) -> C:
+def load_settings(
+    defaults: C, path: str | Path | None, overrides: Mapping[str, str], *, missing: str, unread: Unread
+) -> C:
     """Return settings of which some stand in a YAML file, and single values count more than those.
 
     Parameters
@@ -121,17 +116,29 @@ def load_settings(defaults: C, path: str | Path | None, overrides: Mapping[str, 
         Values as text, by the names of settings.
     missing
         What to say if there is no such file: the problem and a mend.
+    unread
+        What is not read, and so must not be among `overrides` with another value than its default. In a file,
+        which may list all settings, it is let be.
 
     Raises
     ------
     UserError
         If the file cannot be read or is no YAML, or a setting is unknown or out of range; the message tells
-        the file, every line and every mend.
+        the file, every line and every mend. If a single value would never be read.
     """
     values = _values(type(defaults), overrides)
+    given = defaults
     if path is not None:
-        defaults = parse_settings(defaults, file_text(Path(path), missing), str(path))
-    return replace(defaults, **values)
+        given = parse_settings(defaults, file_text(Path(path), missing), str(path))
+    config = replace(given, **values)
+    for (choice, value), names in unread.items():
+        for name in names:
+            idle = getattr(config, choice) == value and name in overrides
+            if idle and getattr(config, name) != getattr(defaults, name):
+                raise UserError(
+                    f"{name}: it is not read with {choice}={value}; leave it out, or give another {choice}"
+                )
+    return config
 
 
 def parse_settings(defaults: C, text: str, source: str = "the settings") -> C:

@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 from hierarchy import GroundGraph
 from planners.exploration import Exploration, Explorer
 from planners.schedules import LearningRate, Rate, by_task
+from planners.states import starting_states
 from planners.task_values import TaskValues
 from worlds import Stream
 
@@ -141,13 +142,16 @@ class Learner(TaskValues):
         ------
         EpisodeTooLongError
             If an episode passes the settings' `max_steps`.
+        UserError
+            If there is nothing to start from, or a task comes to a state in which it has no child to call.
         """
+        begin = starting_states(self.grounded, task, starts).tolist()
         if afresh:
             self.episodes[task] = 0
         counts = []
         for _ in range(episodes):
             self._limit = self.steps + self.settings.max_steps
-            counts.append(len(self._run(task, self.random.choose(starts))[0]))
+            counts.append(len(self._run(task, self.random.choose(begin))[0]))
             if after_each is not None:
                 after_each()
         return counts

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Final, Literal
 
-from planners.config_text import Count, Part, Positive, Share, Weight, check_fields, load_settings
+from planners.config_text import Count, Part, Positive, Share, Unread, Weight, check_fields, load_settings
 from planners.exploration import Boltzmann, Exploration, Explorer
 from planners.learner import Settings
 from planners.schedules import HarmonicRate, LearningRate, Rate
@@ -20,13 +20,12 @@ Falls = Literal["fitting", "geometric", "harmonic"]
 Explores = Literal["share", "boltzmann"]
 """How children are tried: a falling share of random choices, or by Boltzmann's probabilities."""
 
-_UNREAD: Final[Mapping[tuple[str, str], tuple[str, ...]]] = {
+_UNREAD: Final[Unread] = {
     ("rate_falls", "geometric"): ("rate_half",),
     ("rate_falls", "harmonic"): ("rate", "rate_decay", "rate_every"),
     ("explores", "share"): ("heat", "cooling", "least_heat", "cooling_of"),
     ("explores", "boltzmann"): ("exploration_half",),
 }
-"""What is not read, by the choice that keeps it from being read."""
 _BETWEEN: Final = re.compile(r",(?![^(]*\))")  # commas but for those inside a binding
 
 
@@ -183,20 +182,8 @@ def load_tabular_config(
         ...
     worlds.errors.UserError: rate: it is not read with rate_falls=harmonic; leave it out, or give another ...
     """
-    given = overrides or {}
     missing = "there is no such file; check the path, or leave it out"
-    config = load_settings(TabularConfig(), path, given, missing)
-    usual = TabularConfig()
-    for (choice, value), unread in _UNREAD.items():
-        if getattr(config, choice) == value:
-            for name in unread:
-                # What is given as it is by default does no harm: a list of all settings may be given.
-                if name in given and getattr(config, name) != getattr(usual, name):
-                    raise UserError(
-                        f"{name}: it is not read with {choice}={value}; "
-                        f"leave it out, or give another {choice}"
-                    )
-    return config
+    return load_settings(TabularConfig(), path, overrides or {}, missing=missing, unread=_UNREAD)
 
 
 def _coolings(text: str) -> dict[str, float]:

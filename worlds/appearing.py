@@ -43,11 +43,19 @@ def shortest_way(layout: Layout, start: Cell, trigger: Cell, goal: Cell) -> tupl
     return there + _leg(layout, trigger, goal, doors_open=True)[1:]
 
 
-def _leg(layout: Layout, start: Cell, end: Cell, *, doors_open: bool) -> tuple[Cell, ...]:
-    """Return a shortest way between two cells, by breadth-first search back from the end."""
-    first, last = layout.number(start), layout.number(end)
-    distance = {last: 0}
-    queue = deque([last])
+def steps_to(layout: Layout, end: int, *, doors_open: bool) -> dict[int, int]:
+    """Return the fewest steps to a cell from each that has a way there, by breadth-first search back from it.
+
+    Examples
+    --------
+    >>> from worlds import load_layout
+    >>> maze = load_layout("two_rooms")
+    >>> ways = steps_to(maze, maze.number(maze.triggers["T4"]), doors_open=False)
+    >>> ways[maze.number(maze.start)], len(ways)
+    (6, 32)
+    """
+    distance = {end: 0}
+    queue = deque([end])
     while queue:
         cell = queue.popleft()
         for action in range(len(ACTIONS)):
@@ -55,6 +63,13 @@ def _leg(layout: Layout, start: Cell, end: Cell, *, doors_open: bool) -> tuple[C
             if to >= 0 and to not in distance:
                 distance[to] = distance[cell] + 1
                 queue.append(to)
+    return distance
+
+
+def _leg(layout: Layout, start: Cell, end: Cell, *, doors_open: bool) -> tuple[Cell, ...]:
+    """Return a shortest way between two cells."""
+    first, last = layout.number(start), layout.number(end)
+    distance = steps_to(layout, last, doors_open=doors_open)
     if first not in distance:
         raise ValueError(f"no way leads from {start} to {end} in layout {layout.name!r}")
     way = [first]

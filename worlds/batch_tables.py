@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from worlds.appearing import steps_to
 from worlds.batch_reference import StreamedMazeEnv
 from worlds.errors import UserError
 from worlds.layout import ACTIONS, KINDS, Cell, Layout
@@ -158,15 +158,7 @@ def _nexts(layout: Layout, marks: Ints, *, doors_open: bool) -> Ints:
 
 
 def _next(layout: Layout, mark: int, *, doors_open: bool) -> list[int]:
-    distance = {mark: 0}
-    queue = deque([mark])
-    while queue:
-        cell = queue.popleft()
-        for action in range(len(ACTIONS)):
-            to = layout.passage(cell, action, doors_open=doors_open)
-            if to >= 0 and to not in distance:
-                distance[to] = distance[cell] + 1
-                queue.append(to)
+    distance = steps_to(layout, mark, doors_open=doors_open)
     out = [-1] * len(layout.cells)
     out[mark] = mark
     for cell, steps in distance.items():

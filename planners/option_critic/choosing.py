@@ -107,8 +107,8 @@ def upon_arrival(
     """Return what an option is worth where it arrives: U, which goes on or ends, and what going on is ahead.
 
     With probability `ending` of a level its task ends, unless one that called it already has; then the best
-    option that may be chosen there follows, at a `cost`. Sutton, Precup and Singh (1999, section 3), Bacon,
-    Harb and Precup (2017, equation 3), for stacks of tasks.
+    option that may be chosen there follows, be it the same one, at a `cost`. Sutton, Precup and Singh (1999,
+    section 3), Bacon, Harb and Precup (2017, equation 3), for stacks of tasks.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def upon_arrival(
     initiation
         What may be chosen if control comes back at a level, shape (..., levels, options).
     cost
-        The deliberation cost of changing over (Harb et al., 2018).
+        The deliberation cost of ending (Harb et al., 2018).
 
     Returns
     -------

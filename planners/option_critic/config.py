@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Final, Literal
 
@@ -20,18 +19,20 @@ from planners.config_text import (
     Positive,
     Share,
     Size,
+    Unread,
     Weight,
     check_fields,
     load_settings,
     parse_settings,
-    read_settings,
 )
 
 Ends = Literal["given", "learnt", "prior"]
 """What ends a task: the graph; a learnt termination; a learnt one that the graph's is a prior of."""
 
-DEFAULTS: Final = "option_critic.yaml"
-"""The file of the defaults, beside this module."""
+_UNREAD: Final[Unread] = {
+    ("terminations", "given"): ("termination", "prior"),
+    ("terminations", "learnt"): ("prior",),
+}
 
 
 @dataclass(frozen=True)
@@ -55,13 +56,14 @@ class OptionCriticConfig:
     entropy, epsilon
         Weight of the entropy, and the share of options chosen at random; both fall to 0.
     anneal
-        Steps over which the three fall.
+        Steps over which learning rate, entropy and epsilon fall.
     gamma, lmbda
         Discount, and the trace's decay in the advantages.
     clip, critic, most_gradient
         The clipped ratio's width, the weight of the critic's loss, and the largest norm of a gradient.
     termination, prior, deliberation
-        Weights of the termination's gradient and of the graph as its prior, and the cost of ending a task.
+        Weights of the termination's gradient, where it is learnt, and of the graph as its prior, where it is
+        one; and the cost of ending a task.
     max_steps
         Steps after which an episode of learning is cut off.
     total
@@ -138,8 +140,7 @@ def load_config(
     Parameters
     ----------
     path
-        A YAML file of settings; those that it leaves out keep their defaults. Defaults to the file of the
-        defaults.
+        A YAML file of settings; those that it leaves out keep their defaults. None for none.
     overrides
         Values as text, by the names of settings.
 
@@ -147,23 +148,23 @@ def load_config(
     ------
     UserError
         If the file cannot be read or is no YAML, or a setting is unknown or out of range; the message tells
-        the file, every line and every mend.
+        the file, every line and every mend. If a single value would never be read.
 
     Examples
     --------
     >>> load_config(overrides={"rate": "1e-3", "terminations": "prior"}).rate
     0.001
+    >>> load_config(overrides={"prior": "0.5"})
+    Traceback (most recent call last):
+        ...
+    worlds.errors.UserError: prior: it is not read with terminations=given; leave it out, or give another ...
     >>> load_config(overrides={"gama": "0.9"})
     Traceback (most recent call last):
         ...
     worlds.errors.UserError: gama=0.9: there is no such setting; did you mean 'gamma'?
     """
-    given = overrides or {}
-    if path is None:
-        text = files("planners.option_critic").joinpath(DEFAULTS).read_text(encoding="utf-8")
-        return read_settings(parse_config(text, DEFAULTS), given)
     missing = "there is no such file; check the path, or copy planners/option_critic/option_critic.yaml"
-    return load_settings(OptionCriticConfig(), path, given, missing)
+    return load_settings(OptionCriticConfig(), path, overrides or {}, missing=missing, unread=_UNREAD)
 
 
 def parse_config(text: str, source: str = "the settings") -> OptionCriticConfig:

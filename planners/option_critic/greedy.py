@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,10 @@ from scipy.sparse.linalg import splu
 
 from hierarchy.exits import may_come_to, surely_ends
 from planners.option_critic.options import NONE, Options
+from planners.states import state_numbers
+
+EVEN: Final = 0.5
+"""What a learnt termination must exceed to end a task greedily, where nothing is drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,12 +61,11 @@ class GreedyPolicy:
     def returns(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Return the expected undiscounted reward from some states to the root's end, shape (starts,).
 
-        It is -inf where the policy does not surely end.
+        States are given by their numbers. It is -inf where the policy does not surely end.
         """
         model = self.options.grounded.model
-        if model.is_deterministic:
-            return self._followed(starts)
-        return self._solved(starts)
+        numbers = state_numbers(starts, model.index.size)
+        return self._followed(numbers) if model.is_deterministic else self._solved(numbers)
 
     def _followed(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
         """Follow the policy from every state by jumps that double, until no way can be new."""
@@ -84,9 +87,11 @@ class GreedyPolicy:
     def returns_within(self, starts: NDArray[np.int64], limit: int) -> NDArray[np.float64]:
         """Return the expected undiscounted reward of the first so many steps, shape (starts,).
 
-        It is finite, whether the policy ends or not; where nothing may be chosen there is nothing to earn.
+        States are given by their numbers. It is finite, whether the policy ends or not; where nothing may be
+        chosen there is nothing to earn.
         """
-        first, kernel, rewards, live, _ = self._chain(starts)
+        numbers = state_numbers(starts, self.options.grounded.model.index.size)
+        first, kernel, rewards, live, _ = self._chain(numbers)
         places = np.flatnonzero(_reached(kernel, first, live.size))
         inside, earned = kernel[places][:, places], rewards[places]
         values = np.zeros(places.size)

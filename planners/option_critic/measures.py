@@ -8,21 +8,18 @@ given starts, each step of each route counting once.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from planners.fields import task_field
-from planners.option_critic.greedy import GreedyPolicy
+from planners.option_critic.greedy import EVEN, GreedyPolicy
 from planners.option_critic.options import NONE, Options
 from planners.stack import Stack, StackSolution, hierarchical_optimum
+from planners.states import state_numbers
 from worlds import UserError
 
-if TYPE_CHECKING:
-    from planners.option_critic.training import OptionCritic
-
-_EVEN: Final = 0.5  # a learnt termination that is likelier than not ends
 _TIE: Final = 1e-9
 _LOST: Final = -1e12  # stands for minus infinity, whose products are no numbers
 
@@ -184,7 +181,7 @@ def degeneracy(
         Numbers of the states, none of them terminal, shape (starts,).
     beta
         Probability that an option's task at a level ends in a state, shape (states, options, levels):
-        `termination_table`. Defaults to what the graph says.
+        `OptionCritic.terminations`. Defaults to what the graph says.
     oracle
         What the options are held against, if it is there already.
     limit
@@ -213,17 +210,18 @@ def degeneracy(
     """
     options = policy.options
     oracle = Oracle(options) if oracle is None else oracle
-    if not len(starts):
+    states = state_numbers(starts, options.grounded.model.index.size)
+    if not states.size:
         raise UserError("there is no state to start from; give at least one")
     if beta is None:
         beta = options.ended.transpose(0, 2, 1).astype(np.float64)
-    steps = _followed(policy, starts, limit)
+    steps = _followed(policy, states, limit)
     grounded = options.grounded
     after = grounded.model.successors[steps.state, steps.action]
     live = ~grounded.nodes[grounded.root].terminal[after]
     fresh = steps.before == NONE
     # What ran before was chosen anew where any task of its stack had ended.
-    ended = (beta[steps.state, steps.before] > _EVEN).any(1)
+    ended = (beta[steps.state, steps.before] > EVEN).any(1)
     chosen = fresh | ended | (steps.option != steps.before)
     shares = np.bincount(steps.option, minlength=len(options)) / steps.option.size
     used = shares[shares > 0]
@@ -264,16 +262,3 @@ def _followed(policy: GreedyPolicy, starts: NDArray[np.int64], limit: int) -> _S
 
 def _mean(found: NDArray[np.generic]) -> float:
     return float(found.mean()) if found.size else float("nan")
-
-
-def termination_table(learner: OptionCritic) -> NDArray[np.float64] | None:
-    """Return an option-critic's learnt terminations, shape (states, options, levels); None where given."""
-    import torch  # noqa: PLC0415 - the rest of the module does without
-
-    if learner.policy.termination is None:
-        return None
-    with torch.no_grad():
-        states = torch.arange(learner.grounded.model.index.size, device=learner.world.device)
-        logits = learner.policy.seen(learner.world.encoding(states)).get("termination_logits")
-        found: NDArray[np.float64] = logits.sigmoid().double().cpu().numpy()
-    return found

@@ -22,7 +22,7 @@ from hierarchy import GroundCall, GroundGraph, GroundTask, checked
 from worlds import UserError
 
 Mask = NDArray[np.bool_]
-NONE = -1
+NONE: Final = -1
 """Stands for no option: an episode begins."""
 _MOST: Final = 4 << 30  # bytes of masks
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import torch
 from tensordict import TensorDict, TensorDictBase  # type: ignore[import-untyped]
 from tensordict.nn import TensorDictModule, TensorDictModuleBase  # type: ignore[import-untyped]
@@ -11,9 +9,8 @@ from torch import Generator, Tensor
 from torchrl.envs.utils import ExplorationType, exploration_type  # type: ignore[import-untyped]
 
 from planners.option_critic.choosing import any_of, first_ended, greedy, of_option, permitted
+from planners.option_critic.greedy import EVEN
 from planners.option_critic.transform import ACTION_MASK, ENDED, INITIATION, RUNNING
-
-_EVEN: Final = 0.5  # a learnt termination that is likelier than not ends, where nothing is drawn
 
 
 class OptionPolicy(TensorDictModuleBase):  # type: ignore[misc]  # tensordict has no types
@@ -97,7 +94,7 @@ class OptionPolicy(TensorDictModuleBase):  # type: ignore[misc]  # tensordict ha
         """
         if self.termination is not None:
             logits = of_option(seen.get("termination_logits"), running.clamp(min=0))
-            ends = logits.sigmoid() > (self._uniform(logits) if drawn else _EVEN)
+            ends = logits.sigmoid() > (self._uniform(logits) if drawn else EVEN)
             ended = torch.where((running < 0)[..., None], ended, ends)  # at the start all has ended
         switch, level = first_ended(ended)
         choosable = of_option(initiation, level)

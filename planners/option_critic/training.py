@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Final
 
 import numpy as np
@@ -21,6 +22,7 @@ from planners.option_critic.networks import Actor, Critic, Terminations, called_
 from planners.option_critic.options import NONE, Options, compile_options
 from planners.option_critic.policy import OptionPolicy
 from planners.option_critic.transform import TaskStack
+from planners.states import state_numbers
 from worlds import UserError
 from worlds.encoding import Encoding
 from worlds.torch_stream import generator
@@ -143,24 +145,57 @@ class OptionCritic(CollectingLearner):
     def _bounds(self) -> dict[str, range]:
         return {**super()._bounds(), "env.running": range(NONE, len(self.options))}
 
-    @torch.no_grad()
     def greedy(self) -> GreedyPolicy:
         """Return what the policy would do in every state, nothing left to chance."""
-        states = torch.arange(self.grounded.model.index.size, device=self.world.device)
-        parts = [self._greedy(part) for part in torch.split(states, _CHUNK)]
-        option, action = (torch.cat(part).cpu().numpy() for part in zip(*parts, strict=True))
-        return GreedyPolicy(self.options, option, action)
+        return GreedyPolicy(self.options, *self.greedy_in(np.arange(self.grounded.model.index.size)))
 
-    def _greedy(self, state: Tensor) -> tuple[Tensor, Tensor]:
-        seen = self.policy.seen(self.world.encoding(state))
-        count = len(self.options)
+    @torch.no_grad()
+    def greedy_in(self, states: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Return what the policy would do in some states, nothing left to chance.
+
+        Parameters
+        ----------
+        states
+            Numbers of the states, shape (states,).
+
+        Returns
+        -------
+        option
+            What runs on from each, shape (states, options + 1): the rows of `GreedyPolicy.option`.
+        action
+            What each option does there, shape (states, options): the rows of `GreedyPolicy.action`.
+        """
+        numbers = state_numbers(states, self.grounded.model.index.size)
+        parts = [self._chosen(part, seen) for part, seen in self._seen(torch.from_numpy(numbers))]
+        option, action = (torch.cat(part).cpu().numpy() for part in zip(*parts, strict=True))
+        return option, action
+
+    def _chosen(self, state: Tensor, seen: TensorDictBase) -> tuple[Tensor, Tensor]:
         option = []
-        for running in (*range(count), NONE):
+        for running in (*range(len(self.options)), NONE):
             before = torch.full_like(state, running)
             initiation, ended, mask = self.stack.tables(state, before)
             option.append(self.policy.choose(seen, before, initiation, ended)[0])
-        action = self.policy.best_actions(seen, mask)
-        return torch.stack(option, -1), action
+        return torch.stack(option, -1), self.policy.best_actions(seen, mask)
+
+    @torch.no_grad()
+    def terminations(self) -> NDArray[np.float64] | None:
+        """Return what has been learnt of where tasks end; None where the graph says it.
+
+        It is the probability that the task that an option calls at a level ends in a state, shape
+        (states, options, levels).
+        """
+        if self.policy.termination is None:
+            return None
+        parts = self._seen(torch.arange(self.grounded.model.index.size))
+        logits = torch.cat([seen.get("termination_logits") for _, seen in parts])
+        found: NDArray[np.float64] = logits.sigmoid().double().cpu().numpy()
+        return found
+
+    def _seen(self, states: Tensor) -> Iterator[tuple[Tensor, TensorDictBase]]:
+        """Yield states, not too many at once, with what the networks make of them."""
+        for part in torch.split(states.to(self.world.device), _CHUNK):
+            yield part, self.policy.seen(self.world.encoding(part))
 
 
 def _used(batch: TensorDictBase) -> dict[str, float]:

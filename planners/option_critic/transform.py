@@ -21,8 +21,6 @@ ENDED: Final = "ended"
 """Whether the running option's task at a level has ended here, shape (levels,), bool; all where none runs."""
 ACTION_MASK: Final = "option_action_mask"
 """Which actions each option may take, shape (options, actions), bool."""
-
-
 PSEUDO_REWARD: Final = "pseudo_reward"
 """What the running option's policy is taught to expect of where it has ended, shape (1,), float32."""
 

@@ -183,3 +183,18 @@ def test_how_long_each_task_lasts_and_how_often_it_is_called(kind: type[Learner]
         state = learner.follow(route[-1][1], route[-1][0])
     assert calls == ([("Out", 1), ("Back", 3), ("Out", 2)] if kind is MaxQ else [("Out", 4)])
     assert sum(steps for _, steps in calls) == learner.greedy_steps(grounded.root, 1)
+
+
+@every_learner
+def test_what_are_no_states_to_start_from_is_refused(kind: type[Learner]) -> None:
+    """None, a number that is no state's, and a mask, with how to mend it; nothing is learnt."""
+    learner = kind(two_exits(), (0,))
+    grounded = learner.grounded
+    with pytest.raises(UserError, match="task Root has no states to start from; give a list of them"):
+        learner.train(grounded.root, [], episodes=1)
+    for number in (-1, grounded.model.index.size):
+        with pytest.raises(UserError, match=f"numbers from 0 to 5, and {number} is none of them"):
+            learner.train(grounded.root, [1, number], episodes=1)
+    with pytest.raises(UserError, match="of a mask, "):
+        learner.train(grounded.root, grounded.model.starts, episodes=1)
+    assert learner.steps == 0

@@ -11,7 +11,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from planners.option_critic.config import DEFAULTS, OptionCriticConfig, load_config, parse_config
+from planners.config_text import ConfigError
+from planners.option_critic.config import OptionCriticConfig, load_config, parse_config
 from worlds import UserError
 
 COUNTS = st.integers(1, 100_000)
@@ -32,7 +33,7 @@ CONFIGS = st.builds(
 
 def test_the_file_of_defaults_is_the_dataclass() -> None:
     """Every setting stands in it once, in order, with its default and a comment."""
-    text = files("planners.option_critic").joinpath(DEFAULTS).read_text(encoding="utf-8")
+    text = files("planners.option_critic").joinpath("option_critic.yaml").read_text(encoding="utf-8")
     assert parse_config(text) == OptionCriticConfig() == load_config()
     lines = [line for line in text.splitlines() if line and not line.startswith("#")]
     names = [field.name for field in fields(OptionCriticConfig)]
@@ -59,6 +60,26 @@ def test_a_file_gives_what_differs_and_overrides_count_more(tmp_path: Path) -> N
         assert load_config(str(path)) == OptionCriticConfig()
 
 
+@pytest.mark.parametrize(
+    ("given", "problem"),
+    [
+        ({"prior": "2"}, "prior: it is not read with terminations=given; leave it out, or give another"),
+        ({"termination": "0.2"}, "termination: it is not read with terminations=given"),
+        ({"terminations": "learnt", "prior": "2"}, "prior: it is not read with terminations=learnt"),
+    ],
+)
+def test_what_would_never_be_read_is_refused(given: dict[str, str], problem: str, tmp_path: Path) -> None:
+    """A sweep over it would show no effect; in a file, or as it is by default, it does no harm."""
+    with pytest.raises(UserError, match=problem):
+        load_config(overrides=given)
+    (name,) = given.keys() - {"terminations"}
+    assert load_config(overrides={**given, name: str(getattr(OptionCriticConfig(), name))})
+    assert load_config(overrides={**given, "terminations": "prior"}) != OptionCriticConfig()
+    path = tmp_path / "mine.yaml"
+    path.write_text("".join(f"{key}: {value}\n" for key, value in given.items()))
+    assert getattr(load_config(path), name) == float(given[name])
+
+
 def test_every_mistake_of_a_file_is_told_by_line_and_key() -> None:
     """All at once, in order, each with its mend."""
     text = "rte: 1\ngamma: 9\nhidden: [3]\nnum_envs:\nrate: nan\nterminations: learned\nabstracted: maybe\n"
@@ -77,6 +98,14 @@ def test_every_mistake_of_a_file_is_told_by_line_and_key() -> None:
         "mine.yaml, line 10, clip: 0 is not possible; give a number above 0",
         "mine.yaml, line 11, epochs: 1000000 is not possible; give a whole number from 1 to 100000",
     ]
+
+
+def test_of_many_mistakes_the_first_are_told() -> None:
+    """A file that is something else does not fill the screen; `faults` has them all."""
+    with pytest.raises(ConfigError, match=r"^mine\.yaml, line 1, a0: ") as error:
+        parse_config("".join(f"a{i}: 1\n" for i in range(40)), "mine.yaml")
+    assert str(error.value).splitlines()[-1] == "and 28 more in mine.yaml"
+    assert len(error.value.faults) == 40
 
 
 @pytest.mark.parametrize(

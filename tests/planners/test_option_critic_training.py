@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hierarchy import GroundGraph
 from hierarchy.check import checked
 from hierarchy.text import graph_text, load_graph, load_world
+from planners.option_critic import training
 from planners.option_critic.checkpoint import Checkpoint, digest, load_checkpoint, restore, save_checkpoint
 from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.loading import load_option_critic
@@ -78,6 +79,41 @@ def test_what_is_measured(small: tuple[GroundGraph, Path]) -> None:
         assert 1 <= measures["option_duration"] <= 256
         assert 0 <= measures["usage_entropy"] <= log(len(learner.options))
     assert "loss_termination" not in measures
+
+
+@pytest.mark.parametrize("terminations", ["given", "prior"])
+def test_some_states_are_asked_as_all_are(small: tuple[GroundGraph, Path], terminations: str) -> None:
+    """In any order and chunk by chunk, the rows are those of the policy; a mask is refused, none will do."""
+    learner = OptionCritic(small[0], 0, replace(SMALL, terminations=terminations))
+    learnt(learner, 2)
+    policy, size = learner.greedy(), small[0].model.index.size
+    for chunk in (5, 10**6):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(training, "_CHUNK", chunk)
+            for states in (np.array([7, 3, 3, size - 1]), np.arange(size)[::-1], np.zeros(0, dtype=np.int64)):
+                option, action = learner.greedy_in(states)
+                np.testing.assert_array_equal(option, policy.option[states])
+                np.testing.assert_array_equal(action, policy.action[states])
+    with pytest.raises(UserError, match="of a mask, "):
+        learner.greedy_in(small[0].model.starts)
+
+
+def test_learnt_terminations_come_as_a_table(small: tuple[GroundGraph, Path]) -> None:
+    """None where the graph gives them; else the running option goes on unless its task is likely to end."""
+    grounded, _ = small
+    assert OptionCritic(grounded, 0, SMALL).terminations() is None
+    learner = OptionCritic(grounded, 0, replace(SMALL, terminations="learnt"))
+    learnt(learner, 2)
+    table, policy = learner.terminations(), learner.greedy()
+    assert table is not None
+    assert table.shape == learner.options.ended.transpose(0, 2, 1).shape
+    choosable = learner.options.initiation[:, 0].any(axis=1)
+    ends = table[:, :, 0] > 0.5
+    chosen = np.broadcast_to(policy.option[:, -1:], ends.shape)
+    goes_on = np.broadcast_to(np.arange(len(learner.options)), ends.shape)
+    wanted = np.where(ends & choosable[:, None], chosen, goes_on)
+    np.testing.assert_array_equal(policy.option[:, :-1], wanted)
+    assert 0 < ends.mean() < 1
 
 
 @pytest.mark.parametrize(

@@ -160,7 +160,7 @@ def first_states(learner: Flat) -> NDArray[np.int64]:
     return found
 
 
-@settings(max_examples=30)
+@settings(max_examples=30, deadline=None)
 @given(
     most=st.integers(1, 40),
     sizes=st.lists(st.integers(1, 25), min_size=1, max_size=5),

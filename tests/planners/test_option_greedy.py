@@ -1,3 +1,6 @@
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -10,7 +13,7 @@ from hierarchy.taxi import taxi_graph
 from planners import hierarchical_optimum, recursive_optimum
 from planners.option_critic.greedy import GreedyPolicy
 from planners.option_critic.options import NONE, Options, compile_options
-from worlds import Stream, TransitionModel
+from worlds import Stream, TransitionModel, UserError
 
 Table = NDArray[np.int64]
 
@@ -72,6 +75,20 @@ def _slow_returns(policy: GreedyPolicy) -> NDArray[np.float64]:
     values[inside] = np.linalg.solve(np.eye(inside.sum()) - move[np.ix_(inside, inside)], reward[inside])
     found: NDArray[np.float64] = values.reshape(-1, columns)[:, NONE]
     return found
+
+
+@pytest.mark.parametrize("name", ["taxi", "rainy taxi"])
+def test_states_are_given_by_their_numbers(name: str) -> None:
+    """A mask would be read as the states 0 and 1, in worlds with chance and without."""
+    options = compile_options(named(name))
+    policy, model = _random_policy(options, 0), options.grounded.model
+    asks: list[Callable[[Any], Any]] = [policy.returns, lambda starts: policy.returns_within(starts, 3)]
+    for ask in asks:
+        assert ask([3]).shape == (1,)
+        with pytest.raises(UserError, match="of a mask, "):
+            ask(model.starts)
+        with pytest.raises(UserError, match=f"and {model.index.size} is none of them"):
+            ask([0, model.index.size])
 
 
 @settings(max_examples=15, deadline=None)

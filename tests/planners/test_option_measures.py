@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 from hierarchy import GroundGraph, ground, two_rooms
 from hierarchy.taxi import taxi_graph
 from planners import flat_optimum
-from planners.option_critic.config import OptionCriticConfig
 from planners.option_critic.greedy import GreedyPolicy
-from planners.option_critic.measures import Degeneracy, Oracle, degeneracy, termination_table
+from planners.option_critic.measures import Degeneracy, Oracle, degeneracy
 from planners.option_critic.options import Options, compile_options
-from planners.option_critic.training import OptionCritic
 from worlds import TransitionModel, UserError, load_layout, maze_model, parse_layout
 from worlds.taxi import taxi_model
 
@@ -158,17 +156,8 @@ def test_a_world_with_chance_is_refused(small: Oracle) -> None:
 
 
 def test_no_start_is_refused(small: Oracle) -> None:
-    """A mean of no routes would be no number."""
+    """A mean of no routes would be no number; a mask is no list of states."""
+    with pytest.raises(UserError, match="of a mask, "):
+        degeneracy(best(small), small.options.grounded.model.starts, oracle=small)
     with pytest.raises(UserError, match="no state to start from"):
         degeneracy(best(small), np.zeros(0, dtype=np.int64), oracle=small)
-
-
-def test_learnt_terminations_come_as_a_table() -> None:
-    """None where the graph gives them; else what the network says, about one half before learning."""
-    grounded = ground(two_rooms(MAZE), maze_model(MAZE))
-    assert termination_table(OptionCritic(grounded, 1, OptionCriticConfig(num_envs=2))) is None
-    learner = OptionCritic(grounded, 1, OptionCriticConfig(num_envs=2, terminations="learnt"))
-    table = termination_table(learner)
-    assert table is not None
-    assert table.shape == learner.options.ended.transpose(0, 2, 1).shape
-    np.testing.assert_allclose(table, 0.5, atol=0.05)

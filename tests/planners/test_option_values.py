@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -11,7 +13,7 @@ from hierarchy.taxi import taxi_graph
 from planners import LocalRule, StackSolution, hierarchical_optimum
 from planners.option_critic.options import Options, compile_options
 from planners.option_critic.values import OptionValues
-from worlds import ACTIONS, MazeState, load_layout, maze_model
+from worlds import ACTIONS, Cell, MazeState, load_layout, maze_model
 from worlds.taxi import taxi_model
 
 GAMMA = 0.98
@@ -80,15 +82,29 @@ def test_the_best_child_is_worth_what_the_task_is(graph: object) -> None:
     assert checks > 50
 
 
-def test_the_papers_table_4_follows_from_exact_values() -> None:
-    """The cube C1 at 5,0, met at 4,0 on the way to T4, affords East; the sphere S1 on the way South."""
+@pytest.mark.parametrize(
+    ("task", "robot", "kind", "obstacle", "action"),
+    [
+        ("GotoTrigger(T4)", (4, 0), "cubes", (5, 0), "East"),  # C1
+        ("GotoGoal(G2)", (4, 4), "cubes", (3, 4), "East"),  # C3
+        ("GotoTrigger(T4)", (1, 0), "spheres", (3, 0), "South"),  # S1
+        ("GotoGoal(G2)", (5, 4), "spheres", (4, 4), "North"),  # S2
+    ],
+)
+def test_the_papers_table_4_follows_from_exact_values(
+    task: str, robot: tuple[int, int], kind: str, obstacle: tuple[int, int], action: str
+) -> None:
+    """Cubes are passed and spheres pushed, on the way to T4 and on to G2."""
     grounded = paper()
     _, _, values = exact(grounded)
-    state = MazeState(robot=32, trigger=49, goal=31, cubes=frozenset({40}))
-    found = LocalRule(MAZE, values).affordance(grounded.place("GotoTrigger(T4)"), 40, state)
+    at, cell = (MAZE.number(Cell(*place)) for place in (robot, obstacle))
+    marks = MAZE.number(MAZE.triggers["T4"]), MAZE.number(MAZE.goals["G2"])
+    state = MazeState(at, *marks, doors_open=task.startswith("GotoGoal"))
+    found = LocalRule(MAZE, values).affordance(
+        grounded.place(task), cell, replace(state, **{kind: frozenset({cell})})
+    )
     assert found.on_route
-    assert found.action is not None
-    assert ACTIONS[found.action] == "East"
+    assert found.action == ACTIONS.index(action)
 
 
 def test_what_no_option_does_is_worth_nothing_good() -> None:
