@@ -13,7 +13,7 @@ from worlds.errors import UserError
 
 @dataclass(frozen=True)
 class Spec:
-    """What `affordant learn` was asked for; see `comparisons.cli.learn`.
+    """What `affordant learn` was asked for; see `comparisons.commands.learn`.
 
     Raises
     ------

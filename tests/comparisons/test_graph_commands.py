@@ -5,10 +5,10 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+from command_line import affordant
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch
 from matplotlib.transforms import Bbox
 
-from comparisons.cli import main
 from comparisons.figures_graph import task_graph_figure
 from comparisons.graph_drawing import draw_graph
 from hierarchy import TaskGraph, mermaid
@@ -27,18 +27,9 @@ tasks:
 """
 
 
-def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
-    """Run a command; return its exit status and what it printed."""
-    with pytest.raises(SystemExit) as ended:
-        main(tokens)
-    out, err = capsys.readouterr()
-    assert isinstance(ended.value.code, int)
-    return ended.value.code, out, err
-
-
 def test_check_tells_a_graph_and_its_counts(capsys: pytest.CaptureFixture[str]) -> None:
     """Tasks with parameters, terminations and guarded children; the paper's counts; the proof; status 0."""
-    status, out, err = run(capsys, "check", "two_rooms")
+    status, out, err = affordant(capsys, "check", "two_rooms")
     assert (status, err) == (0, "")
     lines = out.splitlines()
     assert lines[0] == "task graph two_rooms on world two_rooms: 4 tasks, 4 primitive actions, 2048 states"
@@ -59,7 +50,7 @@ def test_check_tells_a_graph_and_its_counts(capsys: pytest.CaptureFixture[str]) 
 def test_check_tells_findings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """A graph that cannot run is printed all the same; status 1."""
     (tmp_path / "wrong.yaml").write_text(WRONG)
-    status, out, _ = run(capsys, "check", str(tmp_path / "wrong.yaml"))
+    status, out, _ = affordant(capsys, "check", str(tmp_path / "wrong.yaml"))
     assert status == 1
     assert "findings: 1\n  Root: until (robot = goal) reads 'goal'" in out
     assert "values:" not in out
@@ -69,7 +60,7 @@ def test_check_tells_what_a_task_may_say(capsys: pytest.CaptureFixture[str], tmp
     """Goal, initiation and pseudo-reward appear where there are any."""
     more = "    goal: doors = open\n    start: doors = closed\n    pseudo_reward: -2.5\n    uses: [robot]"
     (tmp_path / "more.yaml").write_text(WRONG.replace("    uses: [robot]", more))
-    _, out, _ = run(capsys, "check", str(tmp_path / "more.yaml"), "--world", "two_rooms")
+    _, out, _ = affordant(capsys, "check", str(tmp_path / "more.yaml"), "--world", "two_rooms")
     for line in ("  goal   doors = open", "  start  doors = closed", "  else   pseudo-reward -2.5"):
         assert line in out.splitlines()
 
@@ -103,7 +94,7 @@ def test_a_users_mistake_is_one_message(
     monkeypatch.chdir(tmp_path)
     Path("text.yaml").write_text(WRONG.replace("= goal", "= gaol"))
     Path("ring.yaml").write_text(WRONG.replace("East]", "Root]"))
-    status, out, err = run(capsys, *tokens)
+    status, out, err = affordant(capsys, *tokens)
     assert (status, out) == (2, "")
     assert err.startswith("affordant: ")
     assert expected in err
@@ -113,7 +104,7 @@ def test_a_users_mistake_is_one_message(
 def test_draw_writes_four_files_once(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """Mermaid, Graphviz and two pictures; a second time nothing is replaced or added."""
     out_dir = tmp_path / "new" / "folder"
-    status, out, _ = run(capsys, "draw", "two_rooms", "--out", str(out_dir))
+    status, out, _ = affordant(capsys, "draw", "two_rooms", "--out", str(out_dir))
     names = [f"two_rooms.{kind}" for kind in ("mmd", "dot", "png", "svg")]
     assert status == 0
     assert [Path(line).name for line in out.splitlines()] == names
@@ -125,7 +116,7 @@ def test_draw_writes_four_files_once(capsys: pytest.CaptureFixture[str], tmp_pat
     assert (out_dir / "two_rooms.svg").read_text(encoding="utf-8").startswith("<?xml")
     for name in names[1:]:
         (out_dir / name).unlink()
-    status, out, err = run(capsys, "draw", "two_rooms", "--out", str(out_dir))
+    status, out, err = affordant(capsys, "draw", "two_rooms", "--out", str(out_dir))
     assert (status, out) == (2, "")
     assert "two_rooms.mmd: it exists already; name another folder" in err
     assert [path.name for path in out_dir.iterdir()] == ["two_rooms.mmd"]
@@ -148,22 +139,19 @@ def test_drawings_appear_all_or_none(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 
 def test_check_with_discounting_finds_funnels(capsys: pytest.CaptureFixture[str]) -> None:
     """Below gamma 1 the paper's root forgets time in three of its calls; at 1 it does not matter."""
-    with pytest.raises(SystemExit) as ended:
-        main(["check", "two_rooms", "--gamma", "0.9"])
-    out = capsys.readouterr().out
-    assert ended.value.code == 1
+    status, out, _ = affordant(capsys, "check", "two_rooms", "--gamma", "0.9")
+    assert status == 1
     assert "findings: 3" in out
     assert "Root -> GotoTrigger(target=trigger): with gamma = 0.9" in out
     assert "44 of 50 tables proved safe" in out
-    with pytest.raises(SystemExit) as refused:
-        main(["check", "two_rooms", "--gamma", "1.5"])
-    assert refused.value.code == 2
-    assert "lies above 0 and up to 1" in capsys.readouterr().err
+    status, _, err = affordant(capsys, "check", "two_rooms", "--gamma", "1.5")
+    assert status == 2
+    assert "lies above 0 and up to 1" in err
 
 
 def test_check_tells_taxis_632_values(capsys: pytest.CaptureFixture[str]) -> None:
     """The graph and the world come with the package; Dietterich's counts, and every table proved."""
-    status, out, err = run(capsys, "check", "taxi")
+    status, out, err = affordant(capsys, "check", "taxi")
     assert (status, err) == (0, "")
     counts = [line.split()[:-1] for line in out.splitlines()]  # less those ever read
     for row in ("completions of Navigate 400", "completions of Root 16", "all of these 632", "flat Q 3000"):
@@ -173,10 +161,10 @@ def test_check_tells_taxis_632_values(capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_check_takes_another_world(capsys: pytest.CaptureFixture[str]) -> None:
     """Rain proves less, a fickle passenger refutes, and Gymnasium's Taxi has the same variables."""
-    status, out, _ = run(capsys, "check", "taxi", "--world", "taxi-fickle")
+    status, out, _ = affordant(capsys, "check", "taxi", "--world", "taxi-fickle")
     assert status == 0
     assert "Put -> Putdown, stored by taxi, destination: refuted" in out
-    status, out, _ = run(capsys, "check", "taxi", "--world", "gym:Taxi-v4")
+    status, out, _ = affordant(capsys, "check", "taxi", "--world", "gym:Taxi-v4")
     assert status == 0
     assert "task graph taxi on world gym:Taxi-v4: 4 tasks, 6 primitive actions, 600 states" in out
 

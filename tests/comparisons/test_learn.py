@@ -14,8 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import FILES, affordant, same_files
 
-from comparisons.cli import main
 from comparisons.learn import registry
 from comparisons.learn.greedy_tables import greedy_tables
 from comparisons.learn.line import Line, Measured
@@ -33,7 +33,6 @@ from worlds import UserError
 MAZE = "grid\n. . : D1 G1\nT1 . | . .\n. . : D2 .\nstart 0,0\ntrigger T1\ngoal G1\n"
 QUICK = ("--set", "num_envs=16", "horizon=16", "hidden=8", "minibatch=100", "max_steps=20")
 OURS = ("option-critic", "flat-ppo", "flat-dqn", "maxq-0", "maxq-q", "hsmq", "flat-q")
-FILES = ("checkpoint.json", "checkpoint.safetensors", "curve.csv")
 
 
 @pytest.fixture(autouse=True)
@@ -46,23 +45,13 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
     """Run the command; return its exit status and what it printed."""
-    with pytest.raises(SystemExit) as ended:
-        main(["learn", *tokens])
-    out, err = capsys.readouterr()
-    assert isinstance(ended.value.code, int)
-    assert "Traceback" not in err
-    return ended.value.code, out, err
+    return affordant(capsys, "learn", *tokens)
 
 
 def rows(folder: str) -> list[dict[str, str]]:
     """Return a learning curve."""
     with Path(folder, "curve.csv").open() as file:
         return list(csv.DictReader(file))
-
-
-def same_files(one: str, other: str) -> bool:
-    """Return whether two runs left the same bytes."""
-    return all(Path(one, name).read_bytes() == Path(other, name).read_bytes() for name in FILES)
 
 
 @pytest.mark.parametrize("learner", ["maxq-0", "flat-q"])

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import affordant, same_files
 
-from comparisons.cli import main
 from comparisons.learn.neural import NeuralRun
 from planners.option_critic.checkpoint import load_checkpoint
 from planners.option_critic.loading import load_option_critic
@@ -18,7 +18,6 @@ from planners.option_critic.loading import load_option_critic
 FIRST, LATER = ("--starts", "goal = 7,9"), ("--starts", "goal = 8,7")
 QUICK = ("--set", "num_envs=8", "horizon=8", "hidden=4", "minibatch=64", "max_steps=50")
 CARRY = ("--carry", "first/checkpoint.safetensors", "--moved", "goal")
-FILES = ("checkpoint.json", "checkpoint.safetensors", "curve.csv")
 
 
 @pytest.fixture(autouse=True)
@@ -30,12 +29,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
     """Run the command; return its exit status and what it printed."""
-    with pytest.raises(SystemExit) as ended:
-        main(["learn", *tokens])
-    out, err = capsys.readouterr()
-    assert isinstance(ended.value.code, int)
-    assert "Traceback" not in err
-    return ended.value.code, out, err
+    return affordant(capsys, "learn", *tokens)
 
 
 def card(folder: str) -> dict[str, object]:
@@ -43,11 +37,6 @@ def card(folder: str) -> dict[str, object]:
     found = json.loads(Path(folder, "checkpoint.json").read_text())
     assert isinstance(found, dict)
     return found
-
-
-def same_files(one: str, other: str) -> bool:
-    """Return whether two runs left the same bytes."""
-    return all(Path(one, name).read_bytes() == Path(other, name).read_bytes() for name in FILES)
 
 
 @pytest.fixture

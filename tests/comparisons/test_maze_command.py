@@ -3,19 +3,17 @@
 from pathlib import Path
 
 import pytest
+from command_line import affordant
 
-from comparisons.cli import main
 from worlds import load_layout, parse_layout
 from worlds.generate import generate_layout
 
 SIZE = ("--rows", "6", "--cols", "8")
 
 
-def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[object, str, str]:
+def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
     """Run the command; return its exit status and what it printed."""
-    with pytest.raises(SystemExit) as ended:
-        main(("maze", *tokens))
-    return ended.value.code, *capsys.readouterr()
+    return affordant(capsys, "maze", *tokens)
 
 
 def test_a_maze_is_printed(capsys: pytest.CaptureFixture[str]) -> None:

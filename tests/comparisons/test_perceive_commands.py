@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from command_line import affordant
 from PIL import Image
 
 from comparisons import learnt
-from comparisons.cli import main
 from comparisons.learnt import frame_backend
 from comparisons.pictures import read_picture
 from perception.percepts import Percepts, Sees, checked_frames
@@ -71,16 +71,9 @@ def _bright(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(learnt, "load_backend", lambda n, c: Bright(c) if n == "bright" else load(n, c))
 
 
-def run(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[object, str, str]:
-    """Run a command; return its exit status and what it printed."""
-    with pytest.raises(SystemExit) as ended:
-        main(tokens)
-    return ended.value.code, *capsys.readouterr()
-
-
-def perceive(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[object, str, str]:
+def perceive(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[int, str, str]:
     """Run `affordant perceive` with the backend of this file."""
-    return run(capsys, "perceive", *tokens, "--perception", "bright")
+    return affordant(capsys, "perceive", *tokens, "--perception", "bright")
 
 
 def paint(path: Path, grey: int = 255, size: tuple[int, int] = (120, 96)) -> Path:
@@ -192,7 +185,7 @@ def test_a_mistake_is_one_message(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()
     paint(tmp_path / "a.png")
-    code, out, err = run(capsys, "perceive", *tokens, "--out", "out")
+    code, out, err = affordant(capsys, "perceive", *tokens, "--out", "out")
     assert (code, out) == (2, "")
     assert message in err
     assert len(err.splitlines()) == 1
@@ -237,15 +230,15 @@ def test_training_makes_frames_and_weights(capsys: pytest.CaptureFixture[str], t
         "--seed",
         "7",
     )
-    code, out, _ = run(capsys, *tokens)
+    code, out, _ = affordant(capsys, *tokens)
     weights = tmp_path / "bright.safetensors"
     assert (code, out.splitlines()[0]) == (0, str(weights))
     assert weights.read_text() == "33 30 7 33 frames of seed 7, everything varied, labelled by pushing"
     shards = {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")}
-    code, _, err = run(capsys, *tokens)
+    code, _, err = affordant(capsys, *tokens)
     assert (code, "bright.safetensors exists there already" in err) == (2, True)
     weights.unlink()
-    assert run(capsys, *tokens)[0] == 0
+    assert affordant(capsys, *tokens)[0] == 0
     assert {path: path.stat().st_mtime_ns for path in tmp_path.rglob("*.npz")} == shards
 
 
@@ -261,7 +254,7 @@ def test_training_refuses(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, tokens: tuple[str, ...], message: str
 ) -> None:
     """Status 2, and nothing is written."""
-    code, out, err = run(capsys, "train-perception", "--out", str(tmp_path / "out"), *tokens)
+    code, out, err = affordant(capsys, "train-perception", "--out", str(tmp_path / "out"), *tokens)
     assert (code, out) == (2, "")
     assert message in err
     assert not (tmp_path / "out").exists()
