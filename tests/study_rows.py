@@ -13,6 +13,13 @@ STEPS = Measure("steps_to_optimal", "environment steps until every start is opti
 OPTIMAL = Measure("optimal", "affordances that are proved optimal first actions", "", "more")
 RETURN = Measure("mean_return", "mean return at the end", "reward", "more")
 COST = Measure("cost_per_mistake", "steps that a mistake costs", "steps")
+MOSTLY_NEVER: tuple[float | None, ...] = (*[None] * 12, *[3000.0] * 8)
+"""Steps of 20 runs, of which 12 never got there."""
+
+
+def wave(level: float, count: int = 20) -> list[float]:
+    """Return numbers around a level, different for each seed."""
+    return [level * (1 + 0.02 * ((7 * seed) % 11 - 5)) for seed in range(count)]
 
 
 def samples(*tasks: Sequence[float], measure: Measure = STEPS) -> Samples:
@@ -40,6 +47,7 @@ class Asked:
     against: str = "1"
     within: tuple[str, ...] = ()
     statistic: str = "iqm"
+    normalise: str = "none"
 
 
 @dataclass(frozen=True)

@@ -1,72 +1,45 @@
-"""The answer to a study's question: a sentence for each level that is compared, with its interval."""
+"""The answer to a study's question: a sentence for each comparison, and what sums them up."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from math import inf
+from typing import NamedTuple
 
 from comparisons.study.kinds import Measure
+from comparisons.study.results.leads import summary
 from comparisons.study.results.paired import Comparison, compare, correct
+from comparisons.study.results.question import Asked, Place, Told
 from comparisons.study.results.rows import L, Levelled, Levels, Row, by_levels, level_words
 from comparisons.study.results.samples import Samples, samples_of
-from comparisons.study.results.sentences import Sides, sentence
-
-
-class Asked(Protocol):
-    """What a study file says under ``answer``."""
-
-    @property
-    def measure(self) -> str:
-        """Name of the measure."""
-
-    @property
-    def compare(self) -> str:
-        """The factor whose levels are compared."""
-
-    @property
-    def against(self) -> str:
-        """The level that the others are compared with."""
-
-    @property
-    def within(self) -> Sequence[str]:
-        """Factors at each of whose levels the comparison is made by itself."""
-
-    @property
-    def statistic(self) -> str:
-        """What sums up the runs: "iqm", "median" or "mean"."""
+from comparisons.study.results.sentences import NO_PAIR, Sides, sentence
+from comparisons.study.results.sizes import counted_in, counted_measure, sizes_of, warning
+from comparisons.study.results.wording import plain
 
 
 @dataclass(frozen=True)
-class Told:
-    """One comparison of the answer.
+class Answered:
+    """The whole answer.
 
     Parameters
     ----------
-    within
-        Where it is made: one level's label by factor.
-    factor, level, against
-        What is compared: a level of the factor with another.
-    comparison
-        How they differ; None if no task and seed has a result of both.
-    missing
-        Number of runs of the two that were declared and have no result.
-    sentence
-        The same in words.
+    lead
+        Sentences that say what to know before, or sum the comparisons up; often none.
+    told
+        The comparisons.
+    measure
+        What they compare: the measure, or multiples of a task's size of it.
     """
 
-    within: Levels
-    factor: str
-    level: str
-    against: str
-    comparison: Comparison | None
-    missing: int
-    sentence: str
+    lead: tuple[str, ...]
+    told: tuple[Told, ...]
+    measure: Measure
 
 
 def answers(
     asked: Asked, measure: Measure, rows: Sequence[Row], missing: Iterable[Levelled] = ()
-) -> list[Told]:
+) -> Answered:
     """Return the answer: a comparison for each level but the one compared with, wherever it is made.
 
     Factors that are neither compared nor of ``within`` are the tasks. All p values are corrected together.
@@ -93,9 +66,9 @@ def answers(
     ...     for seed in range(20)
     ... ]
     >>> asked = SimpleNamespace(
-    ...     measure=steps.name, compare="gamma", against="1", within=(), statistic="iqm"
+    ...     measure=steps.name, compare="gamma", against="1", within=(), statistic="iqm", normalise="none"
     ... )
-    >>> for part in answers(asked, steps, rows)[0].sentence.split("; "):
+    >>> for part in answers(asked, steps, rows).told[0].sentence.split("; "):
     ...     print(part)
     gamma 0.9 needs 1.50 times (95 % 1.50 to 1.50) the steps of gamma 1 until every start is optimal
     IQMs of 20 seeds each, paired, p < 0.0001.
@@ -104,27 +77,39 @@ def answers(
     everything: list[Levelled] = [*rows, *absent]
     factors = list(everything[0].levels) if everything else []
     tasks = [name for name in factors if name != asked.compare and name not in asked.within]
+    against = f"{asked.compare} {asked.against}"
+    shown = counted_measure(measure, against) if asked.normalise == "against" else measure
     found: list[_Pair] = []
+    places: list[Place] = []
     for place in by_levels(everything, asked.within):
         within = dict(zip(asked.within, place, strict=True))
         here = by_levels(_at(rows, within), [asked.compare])
         gone = by_levels(_at(absent, within), [asked.compare])
         samples = {level: samples_of(alike, measure, tasks) for (level,), alike in here.items()}
-        base = samples.get(asked.against, Samples(measure, {}))
+        reason = NO_PAIR
+        if asked.normalise == "against":
+            samples, reason = _normalised(samples, asked.against, against)
+        places.append(Place(within, samples))
+        nothing = Samples(shown, {})
+        base = samples.get(asked.against, nothing)
         for (level,) in by_levels(_at(everything, within), [asked.compare]):
             if level == asked.against:
                 continue
-            other = samples.get(level, Samples(measure, {}))
+            other = samples.get(level, nothing)
             sides = Sides(
                 level_words(within),
                 f"{asked.compare} {level}",
-                f"{asked.compare} {asked.against}",
-                measure,
+                against,
+                shown,
                 sum(len(gone.get((side,), [])) for side in (level, asked.against)),
                 other.untold + base.untold,
+                reason,
             )
             found.append(_Pair(within, level, sides, compare(other, base, asked.statistic)))
-    return _told(asked, found)
+    told = _told(asked, found)
+    mixed = warning(max((each.comparison.apart for each in told if each.comparison), default=1.0), shown)
+    lead = (*([mixed] if mixed else []), *summary(asked, shown, told, places))
+    return Answered(lead, told, shown)
 
 
 class _Pair(NamedTuple):
@@ -134,7 +119,19 @@ class _Pair(NamedTuple):
     comparison: Comparison | None
 
 
-def _told(asked: Asked, found: Sequence[_Pair]) -> list[Told]:
+def _normalised(samples: Mapping[str, Samples], level: str, words: str) -> tuple[dict[str, Samples], str]:
+    """Return numbers in medians of a level by task; none, and why, if that cannot be."""
+    if level not in samples:
+        return {}, NO_PAIR
+    sizes = sizes_of(samples[level])
+    unfit = next((task for task, size in sizes.items() if not 0 < size < inf), None)
+    if unfit is not None:
+        told = f"never reached in {unfit}" if sizes[unfit] == inf else f"{plain(sizes[unfit])} in {unfit}"
+        return {}, f"the median of {words} is {told.removesuffix(' in ')}, and nothing can be counted in it"
+    return {name: counted_in(each, sizes, words) for name, each in samples.items()}, NO_PAIR
+
+
+def _told(asked: Asked, found: Sequence[_Pair]) -> tuple[Told, ...]:
     """Return comparisons with their sentences; what rests on too few seeds is not ranked, and no test."""
     tested = {
         i: pair.comparison for i, pair in enumerate(found) if pair.comparison and not pair.comparison.few
@@ -145,7 +142,7 @@ def _told(asked: Asked, found: Sequence[_Pair]) -> list[Told]:
         comparison = corrected.get(i, uncorrected)
         words = sentence(sides, comparison)
         told.append(Told(within, asked.compare, level, asked.against, comparison, sides.missing, words))
-    return told
+    return tuple(told)
 
 
 def _at(rows: Iterable[L], within: Levels) -> list[L]:

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from comparisons.study.results.exporting import flat
 from comparisons.study.results.rows import KeptRuns
-from comparisons.study.spec import RunSpec, canonical
+from comparisons.study.spec import RunSpec, canonical, digest
 
 MOST_TOLD: Final = 20
 """Runs of each sort that the text tells of one by one."""
@@ -179,15 +179,23 @@ def _value(value: object) -> str:
     return _ABSENT if value is None else str(value)
 
 
+def _traits(spec: RunSpec) -> dict[str, object]:
+    """Return what makes a spec what it is, but for its seed; the texts of files by their digests."""
+    texts = {f"text of {name}": digest(text)[:8] for name, text in spec.files.items()}
+    return {"kind": spec.kind, "version": spec.version, **spec.settings, **texts}
+
+
 def _varying(specs: Sequence[RunSpec]) -> list[str]:
-    """Return the settings that tell some specs apart."""
-    names = dict.fromkeys(name for spec in specs for name in spec.settings)
-    return [name for name in names if len({repr(spec.settings.get(name)) for spec in specs}) > 1]
+    """Return the traits that tell some specs apart."""
+    every = [_traits(spec) for spec in specs]
+    names = dict.fromkeys(name for traits in every for name in traits)
+    return [name for name in names if len({repr(traits.get(name)) for traits in every}) > 1]
 
 
 def _spec(spec: RunSpec, varying: Sequence[str]) -> str:
     """Return what tells a spec from others."""
-    told = [f"{name} {spec.settings[name]}" for name in varying if name in spec.settings]
+    traits = _traits(spec)
+    told = [f"{name} {traits[name]}" for name in varying if name in traits]
     return ", ".join([f"seed {spec.seed}", *told])
 
 

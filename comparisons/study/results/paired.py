@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, sqrt
+from math import inf
 from typing import Final
 
 import numpy as np
-from scipy.stats import norm, rankdata
 
 from comparisons.study.results.resampling import Array, inner, resampled
 from comparisons.study.results.samples import Samples
+from comparisons.study.results.significance import SIGNIFICANT, holm, leaning, least_p, signed_rank
+from comparisons.study.results.sizes import apart, has_ratio
 from comparisons.study.results.statistics import (
     Estimate,
     Interval,
@@ -21,9 +23,6 @@ from comparisons.study.results.statistics import (
     improvement,
 )
 
-SIGNIFICANT: Final = 0.05
-"""A difference is told as one where p is below this."""
-_MOST_EXACT: Final = 200  # pairs; the exact distribution takes some 10 ms then
 _DIGITS: Final = 12  # of differences: sums of floats that should tie differ by less
 
 
@@ -50,10 +49,17 @@ class Comparison:
         Number of runs that are left out since the other side has none of their task and seed.
     differing
         Number of pairs that differ at all.
+    apart
+        How many times the smallest task's size the largest task's is (`comparisons.study.results.sizes`).
+    ahead
+        Which side has more pair by pair, by the signed ranks: 1 if the first has, -1 if the second, 0 if
+        neither. It need not be the side of the larger statistic.
     p
         Of Wilcoxon's signed-rank test, both sides.
     corrected
         The same after Holm's correction for `tests` tests; as it is while nothing is corrected.
+    least
+        What `corrected` would be if every pair differed, and all of them the same way.
     tests
         Number of tests that it is corrected for.
     """
@@ -69,8 +75,11 @@ class Comparison:
     tasks: int
     unpaired: int
     differing: int
+    apart: float
+    ahead: int
     p: float
     corrected: float
+    least: float
     tests: int = 1
 
     @property
@@ -86,7 +95,18 @@ class Comparison:
     @property
     def powerless(self) -> bool:
         """Whether the test could not have shown a difference, even if every pair agreed."""
-        return self.tests * 2.0 ** (1 - self.pairs) >= SIGNIFICANT
+        return self.least >= SIGNIFICANT
+
+    @property
+    def clear(self) -> bool:
+        """Whether the interval, of the ratio if there is one, leaves out that there is no difference."""
+        interval, none = (self.difference, 0.0) if self.ratio is None else (self.ratio, 1.0)
+        return interval is not None and not interval.low <= none <= interval.high
+
+    @property
+    def contrary(self) -> bool:
+        """Whether the side that has more pair by pair has the smaller statistic."""
+        return self.difference is not None and self.difference.value * self.ahead < 0
 
 
 def compare(first: Samples, second: Samples, statistic: str = "iqm") -> Comparison | None:
@@ -135,25 +155,27 @@ def compare(first: Samples, second: Samples, statistic: str = "iqm") -> Comparis
     difference = _interval(_less(values), None if drawn is None else _less(drawn), one)
     ratio = None
     positive = one.values.min() >= 0 and other.values.min() > 0
-    # A reward's zero is anywhere: only what there can be none of, such as steps, has ratios.
-    if one.measure.unit and one.measure.better != "more" and positive:
+    if has_ratio(one.measure) and positive:
         ratio = _interval(_by(values), None if drawn is None else _by(drawn), one, least=0.0)
     gaps = paired_gaps(one, other)
     p = signed_rank(gaps)
     return Comparison(
-        statistic,
-        estimates[0],
-        estimates[1],
-        difference,
-        ratio,
-        None if one.measure.better is None else improvement(one, other),
-        one.runs,
-        one.seeds,
-        len(one.arrays),
-        unpaired,
-        int(np.count_nonzero(gaps)),
-        p,
-        p,
+        statistic=statistic,
+        first=estimates[0],
+        second=estimates[1],
+        difference=difference,
+        ratio=ratio,
+        chance=None if one.measure.better is None else improvement(one, other),
+        pairs=one.runs,
+        seeds=one.seeds,
+        tasks=len(one.arrays),
+        unpaired=unpaired,
+        differing=int(np.count_nonzero(gaps)),
+        apart=apart(other),
+        ahead=leaning(gaps),
+        p=p,
+        corrected=p,
+        least=least_p(one.runs),
     )
 
 
@@ -172,63 +194,20 @@ def paired_gaps(first: Samples, second: Samples) -> Array:
     return np.asarray(gaps)
 
 
-def signed_rank(gaps: Sequence[float] | Array) -> float:
-    """Return the p value of Wilcoxon's signed-rank test, both sides, of paired differences.
-
-    Pairs that do not differ are left out, as Wilcoxon does (Biometrics Bulletin 1, 1945); equal ones share
-    their middle rank, and infinite ones come last. Up to 200 pairs, the distribution is that of all ways to
-    give these very ranks signs, so that ties do not make it less exact; beyond, it is the normal one of the
-    same mean and variance.
-
-    Examples
-    --------
-    >>> signed_rank([1.0, 2.0, 3.0, 4.0, 5.0, float("inf")]), signed_rank([1.0, 1.0, 1.0, -1.0])
-    (0.03125, 0.625)
-    >>> signed_rank([0.0, 0.0])
-    1.0
-    """
-    given = np.asarray(gaps, dtype=np.float64)
-    given = given[given != 0]
-    if not len(given):
-        return 1.0
-    ranks = rankdata(np.abs(given))
-    above = float(ranks[given > 0].sum())
-    if len(given) > _MOST_EXACT:
-        spread = sqrt(float((ranks**2).sum())) / 2
-        return float(2 * norm.sf(abs(above - ranks.sum() / 2) / spread))
-    # Middle ranks are multiples of a half: doubled, sums of them are places in an array.
-    doubled = np.rint(2 * ranks).astype(np.int64)
-    chances = np.zeros(int(doubled.sum()) + 1)
-    chances[0] = 1.0
-    for rank in doubled:
-        shifted = np.concatenate([np.zeros(rank), chances[: len(chances) - rank]])
-        chances = (chances + shifted) / 2
-    place = round(2 * above)
-    return float(min(2 * min(chances[: place + 1].sum(), chances[place:].sum()), 1.0))
-
-
-def holm(values: Sequence[float]) -> list[float]:
-    """Return p values corrected for there being many: Holm, Scandinavian Journal of Statistics 6 (1979).
-
-    Examples
-    --------
-    >>> holm([0.01, 0.04, 0.03])
-    [0.03, 0.06, 0.06]
-    """
-    order = sorted(range(len(values)), key=lambda i: values[i])
-    corrected, least = [0.0] * len(values), 0.0
-    for place, i in enumerate(order):
-        least = max(least, min((len(values) - place) * values[i], 1.0))
-        corrected[i] = least
-    return corrected
-
-
 def correct(comparisons: Sequence[Comparison]) -> list[Comparison]:
     """Return comparisons of one question with their p values corrected for each other."""
-    values = holm([comparison.p for comparison in comparisons])
+    given = [comparison.p for comparison in comparisons]
+    corrected, tests = holm(given), len(given)
+    before, sofar = sorted(given), sorted(corrected)
+
+    def best(p: float) -> float:
+        """Return the correction of a p value that stands in for one at least as large."""
+        place = bisect_left(before, p)
+        return max(min((tests - place) * p, 1.0), sofar[place - 1] if place else 0.0)
+
     return [
-        replace(comparison, corrected=value, tests=len(comparisons))
-        for comparison, value in zip(comparisons, values, strict=True)
+        replace(comparison, corrected=value, least=best(least_p(comparison.pairs)), tests=tests)
+        for comparison, value in zip(comparisons, corrected, strict=True)
     ]
 
 

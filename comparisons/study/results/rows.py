@@ -78,31 +78,6 @@ class Row:
 
 
 L = TypeVar("L", bound=Levelled)
-P = TypeVar("P", bound=Planned)
-
-
-def rows_of(planned: Iterable[Planned], store: KeptRuns) -> list[Row]:
-    """Return a row for each planned run whose result is in the store, in the plan's order.
-
-    Parameters
-    ----------
-    planned
-        The study's runs, as ``study.expand()`` gives them.
-    store
-        Where results are kept. Those of runs that are not planned are left alone.
-    """
-    kept = set(store.hashes())
-    return [
-        Row(run.levels, run.spec.seed, run.spec.hash, store.read(run.spec.hash).result)
-        for run in planned
-        if run.spec.hash in kept
-    ]
-
-
-def missing_of(planned: Iterable[P], rows: Iterable[Row]) -> list[P]:
-    """Return the planned runs that have no row: they failed, or have not been run yet."""
-    there = {row.hash for row in rows}
-    return [run for run in planned if run.spec.hash not in there]
 
 
 def by_levels(rows: Iterable[L], factors: Sequence[str]) -> dict[tuple[str, ...], list[L]]:

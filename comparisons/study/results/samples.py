@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from comparisons.study.kinds import Measure
 from comparisons.study.results.rows import Row, by_levels, level_words
-from comparisons.study.results.wording import counted
 from worlds import UserError
 
 FEWEST_SEEDS: Final = 5
@@ -146,38 +145,3 @@ def samples_of(rows: Iterable[Row], measure: Measure, tasks: Sequence[str] = ())
             else:
                 numbers[row.seed] = number
     return Samples(measure, {task: numbers for task, numbers in found.items() if numbers}, untold)
-
-
-def refuse_few(rows: Iterable[Row], what: str = "this study") -> None:
-    """Refuse to rank on fewer seeds than five.
-
-    Parameters
-    ----------
-    rows
-        Every run that the ranking would use.
-    what
-        What was to be ranked, for the message.
-
-    Raises
-    ------
-    UserError
-        If a combination of levels has fewer; it says which and how many it has.
-
-    Examples
-    --------
-    >>> from comparisons.study.kinds import Result
-    >>> refuse_few([Row({"gamma": "1"}, seed, "", Result({})) for seed in range(3)])
-    Traceback (most recent call last):
-        ...
-    worlds.errors.UserError: this study: gamma 1 has 3 seeds, and ranking needs 5; give it more seeds
-    """
-    groups: dict[str, set[int]] = {}
-    for row in rows:
-        groups.setdefault(level_words(row.levels), set()).add(row.seed)
-    if not groups:
-        raise UserError(f"{what}: no run has a result, and ranking needs 5 seeds; run it first")
-    levels, seeds = min(groups.items(), key=lambda group: len(group[1]))
-    if len(seeds) < FEWEST_SEEDS:
-        where = f"{levels} has" if levels else ("there is" if len(seeds) == 1 else "there are")
-        there = counted(len(seeds), "seed")
-        raise UserError(f"{what}: {where} {there}, and ranking needs {FEWEST_SEEDS}; give it more seeds")

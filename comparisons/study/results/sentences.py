@@ -8,10 +8,24 @@ from typing import Final, NamedTuple
 from comparisons.study.kinds import Measure
 from comparisons.study.results.paired import Comparison
 from comparisons.study.results.samples import FEWEST_SEEDS
+from comparisons.study.results.significance import SIGNIFICANT
+from comparisons.study.results.sizes import FAR
 from comparisons.study.results.statistics import Estimate, Interval
-from comparisons.study.results.wording import chance_of, counted, decimals_of, number, plain, reach, spread
+from comparisons.study.results.wording import (
+    CALLED,
+    article,
+    chance_of,
+    counted,
+    decimals_of,
+    number,
+    plain,
+    ratio_decimals,
+    reach,
+    spread,
+)
 
-_CALLED: Final = {"iqm": "IQM", "median": "median", "mean": "mean"}
+NO_PAIR: Final = "no seed has both"
+"""Why nothing can be said of two levels, as a rule."""
 
 
 class Sides(NamedTuple):
@@ -29,6 +43,8 @@ class Sides(NamedTuple):
         Number of runs of the two that were declared and have no result.
     untold
         Number of runs of the two that had nothing to tell.
+    reason
+        Why nothing can be said, should there be no comparison.
     """
 
     where: str
@@ -37,6 +53,7 @@ class Sides(NamedTuple):
     measure: Measure
     missing: int = 0
     untold: int = 0
+    reason: str = NO_PAIR
 
 
 def sentence(sides: Sides, comparison: Comparison | None) -> str:
@@ -44,7 +61,7 @@ def sentence(sides: Sides, comparison: Comparison | None) -> str:
     where = f"{sides.where}: " if sides.where else ""
     if comparison is None:
         left = _left_out(sides, 0)
-        return f"{where}nothing can be said of {sides.first} against {sides.second}: no seed has both{left}."
+        return f"{where}nothing can be said of {sides.first} against {sides.second}: {sides.reason}{left}."
     if comparison.few:
         return f"{where}{_too_few(sides, comparison)}{_left_out(sides, comparison.unpaired)}."
     if not (isfinite(comparison.first.value) and isfinite(comparison.second.value)):
@@ -57,12 +74,14 @@ def sentence(sides: Sides, comparison: Comparison | None) -> str:
 
 def _too_few(sides: Sides, comparison: Comparison) -> str:
     """Return the two estimates, unranked."""
-    called, seeds = _CALLED[comparison.statistic], counted(comparison.seeds, "seed")
+    called, seeds = CALLED[comparison.statistic], counted(comparison.seeds, "seed")
     of = f"{called} of {sides.measure.about}"
     first, second = (_estimate(side, sides.measure) for side in (comparison.first, comparison.second))
-    there = "is" if comparison.seeds == 1 else "are"
+    there = "there is" if comparison.seeds == 1 else "there are"
+    if comparison.tasks > 1:
+        there = "a task has but"
     return (
-        f"not ranked, for there {there} {seeds} and {FEWEST_SEEDS} are needed; {of}: {sides.first} {first}, "
+        f"not ranked, for {there} {seeds} and {FEWEST_SEEDS} are needed; {of}: {sides.first} {first}, "
         f"{sides.second} {second}"
     )
 
@@ -70,19 +89,36 @@ def _too_few(sides: Sides, comparison: Comparison) -> str:
 def _finite(sides: Sides, comparison: Comparison) -> str:
     """Return what a difference is, or that there is none to be seen."""
     between = f"between {sides.first} and {sides.second}"
-    about = _as_of(sides.measure)
+    about = article(sides.measure)
     if not comparison.differing:
         alike = f"all {comparison.pairs} pairs are alike"
         return f"no difference {between} in {about}: {alike}"
-    if comparison.significant:
-        ratio, difference = comparison.ratio, comparison.difference
-        spans = (ratio is not None and ratio.low <= 1 <= ratio.high) or (
-            ratio is None and difference is not None and difference.low <= 0 <= difference.high
-        )
-        doubt = "; the interval takes in no difference, yet pair by pair one side is ahead" if spans else ""
-        return f"{_effect(sides, comparison)}{doubt}"
-    size = _size(sides.measure, comparison)
-    return f"no difference {between} that {_power(comparison)}, in {about}: {size}"
+    if not comparison.significant:
+        size = f"{_size(sides.measure, comparison)}{_uncorrected(comparison)}"
+        return f"no difference {between} that {_power(comparison)}, in {about}: {size}"
+    if comparison.clear and not comparison.contrary:
+        return _effect(sides, comparison)
+    # The test looks at pairs, the statistic at both sides' middles: they may well tell different things.
+    lies = "above" if comparison.ahead > 0 else "below"
+    called = f"{CALLED[comparison.statistic]}s"
+    doubt = (
+        f"{called} lie the other way"
+        if comparison.clear
+        else f"interval of their {called} takes in no difference"
+    )
+    return (
+        f"pair by pair {sides.first} mostly lies {lies} {sides.second} in {about}, though the {doubt}: "
+        f"{_size(sides.measure, comparison)}"
+    )
+
+
+def _uncorrected(comparison: Comparison) -> str:
+    """Return why an interval leaves out what the test does not, if it does."""
+    if not comparison.clear or comparison.powerless:
+        return ""
+    if comparison.p < SIGNIFICANT:
+        return f", an interval that is not corrected for {comparison.tests} comparisons"
+    return ", though pair by pair neither side is surely ahead"
 
 
 def _effect(sides: Sides, comparison: Comparison) -> str:
@@ -104,7 +140,7 @@ def _effect(sides: Sides, comparison: Comparison) -> str:
         return f"{first} has {_amount(shown, measure)} {compared} in {measure.about}"
     compared = f"{'below' if less else 'above'} {second}"
     both = (number(side.value, measure) for side in (comparison.first, comparison.second))
-    return f"{first} is {_amount(shown, measure)} {compared} in {_as_of(measure)}: {' against '.join(both)}"
+    return f"{first} is {_amount(shown, measure)} {compared} in {article(measure)}: {' against '.join(both)}"
 
 
 def _size(measure: Measure, comparison: Comparison) -> str:
@@ -116,24 +152,20 @@ def _size(measure: Measure, comparison: Comparison) -> str:
 
 
 def _times(ratio: Interval) -> str:
-    shown = plain(ratio.value, decimals_of(*_bounds(ratio)))
-    return f"{shown} times ({reach(*_bounds(ratio), 0.0)})"
-
-
-def _bounds(interval: Interval) -> tuple[float, float, float]:
-    return interval.value, interval.low, interval.high
+    decimals = ratio_decimals(ratio.value, ratio.low, ratio.high)
+    return f"{plain(ratio.value, decimals)} times ({reach(ratio.low, ratio.high, decimals, 0.0)})"
 
 
 def _amount(difference: Interval, measure: Measure) -> str:
     times, unit = (1.0, measure.unit) if measure.unit else (100.0, "percentage points")
-    value, low, high = (times * bound for bound in _bounds(difference))
-    shown = plain(value, decimals_of(value, low, high))
-    return f"{shown} {unit} ({reach(value, low, high, -inf)})"
+    value, low, high = (times * bound for bound in (difference.value, difference.low, difference.high))
+    decimals = decimals_of(value, low, high)
+    return f"{plain(value, decimals)} {unit} ({reach(low, high, decimals, -inf)})"
 
 
 def _never(sides: Sides, comparison: Comparison) -> str:
     """Return a comparison in which a statistic is infinite, since too many runs never got there."""
-    called = _CALLED[comparison.statistic]
+    called = CALLED[comparison.statistic]
     both = ((sides.first, comparison.first), (sides.second, comparison.second))
     parts = []
     for name, side in both:
@@ -145,10 +177,12 @@ def _never(sides: Sides, comparison: Comparison) -> str:
         )
     lead = f"no difference between {sides.first} and {sides.second} that {_power(comparison)}"
     if comparison.significant:
-        assert comparison.chance is not None, "only what can be ranked is infinite"
-        worse = comparison.chance.value < 0.5
-        lead = f"{sides.first} is {'worse' if worse else 'better'} than {sides.second}"
-    return f"{lead}, in {_as_of(sides.measure)}: {'; '.join(parts)}"
+        better = (comparison.ahead > 0) == (sides.measure.better == "more")
+        lead = f"{sides.first} is {'better' if better else 'worse'} than {sides.second}"
+        if comparison.contrary:
+            missed = next(name for name, side in both if not isfinite(side.value))
+            lead = f"pair by pair {lead}, though more of the runs with {missed} never got there"
+    return f"{lead}, in {article(sides.measure)}: {'; '.join(parts)}"
 
 
 def _power(comparison: Comparison) -> str:
@@ -169,9 +203,11 @@ def _some_never(sides: Sides, comparison: Comparison) -> str:
 def _runs(comparison: Comparison) -> str:
     """Return on how much a comparison rests."""
     tasks = f" in {comparison.tasks} tasks" if comparison.tasks > 1 else ""
+    if comparison.apart > FAR:
+        tasks += " that differ much in size"
     many = f" after Holm's correction for {comparison.tests} comparisons" if comparison.tests > 1 else ""
     seeds = counted(comparison.seeds, "seed")
-    called = f"{_CALLED[comparison.statistic]}s"
+    called = f"{CALLED[comparison.statistic]}s"
     return f"{called} of {seeds} each{tasks}, paired, {chance_of(comparison.corrected)}{many}"
 
 
@@ -189,8 +225,3 @@ def _left_out(sides: Sides, unpaired: int) -> str:
 
 def _estimate(side: Estimate, measure: Measure) -> str:
     return spread(side.value, side.low, side.high, measure, unit=True)
-
-
-def _as_of(measure: Measure) -> str:
-    """Return what was measured, after a preposition."""
-    return f"the {measure.about}" if measure.about.startswith("share") else measure.about

@@ -162,25 +162,6 @@ def estimate(samples: Samples, statistic: str = "iqm") -> Estimate | None:
     return _of(samples, statistic, value, low, high)
 
 
-def share_reached(samples: Samples) -> Estimate | None:
-    """Return the share of runs that got there with Wilson's interval; None if there are none.
-
-    With several tasks the interval is that of as many runs of one task, which is never narrower.
-
-    Examples
-    --------
-    >>> from comparisons.study.kinds import Measure
-    >>> steps = Measure("steps", "steps to the goal", "steps", "less")
-    >>> found = share_reached(Samples(steps, {"": {0: 3.0, 1: np.inf, 2: 4.0, 3: 5.0}}))
-    >>> found.value, round(found.low, 3), round(found.high, 3)
-    (0.75, 0.301, 0.954)
-    """
-    if not samples.runs:
-        return None
-    low, high = wilson(samples.reached, samples.runs)
-    return _of(samples, "reached", samples.reached / samples.runs, low, high)
-
-
 def profile(samples: Samples, thresholds: Sequence[float] | None = None) -> Profile:
     """Return the share of runs at least as good as each threshold: the Precipice, section 4.
 
@@ -217,8 +198,8 @@ def improvement(first: Samples, second: Samples) -> Estimate | None:
     """Return the chance that a run of the first is better than one of the second; None if no task is common.
 
     A tie counts as half, also one of two runs that never got there. Chances are averaged over the tasks: the
-    Precipice, section 4. Where every run of one beats every run of the other, resampling shows no spread;
-    Wilson's interval of as many seeds stands in then.
+    Precipice, section 4. Where every run of one beats every run of the other, or all tie, resampling shows
+    no spread; Wilson's interval of as many seeds stands in then.
 
     Raises
     ------
@@ -255,11 +236,10 @@ def improvement(first: Samples, second: Samples) -> Estimate | None:
         )
 
     seeds = min(first.seeds, second.seeds)
-    if value in (0.0, 1.0):
-        low, high = wilson(seeds if value else 0, seeds)
-    else:
-        places = [np.arange(len(each)) for each in (*first.arrays, *second.arrays)]
-        low, high = inner(resampled(places, of), min(first.runs, second.runs), len(common))
+    drawn = resampled([np.arange(len(each)) for each in (*first.arrays, *second.arrays)], of)
+    low, high = inner(drawn, min(first.runs, second.runs), len(common))
+    if low == high:
+        low, high = wilson(round(value * seeds), seeds)
     runs, reached = first.runs + second.runs, first.reached + second.reached
     return Estimate(value, low, high, "improvement", runs, seeds, len(common), reached)
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import isfinite
 
 from comparisons.study.kinds import Measure
-from comparisons.study.results.answers import Told
 from comparisons.study.results.paired import Comparison
+from comparisons.study.results.question import Told
 from comparisons.study.results.rows import Levelled, Row, by_levels
 from comparisons.study.results.samples import FEWEST_SEEDS, samples_of
+from comparisons.study.results.sizes import warning
 from comparisons.study.results.statistics import Estimate, Interval, estimate
 from comparisons.study.results.tables import Table
-from comparisons.study.results.wording import chance_of, counted, decimals_of, plain, spread
+from comparisons.study.results.wording import chance_of, counted, decimals_of, plain, ratio_decimals, spread
 
 _CALLED = {"iqm": "interquartile mean", "median": "median", "mean": "mean"}
 _FEW = "*"  # marks estimates of few seeds
@@ -107,6 +108,10 @@ def comparisons_table(
         f"test, and after Holm's correction for {counted(tests, 'comparison')}. Not ranked where there are "
         f"fewer than {FEWEST_SEEDS} seeds."
     )
+    if mixed := warning(
+        max((each.comparison.apart for each in told if each.comparison), default=1.0), measure
+    ):
+        note += f" {mixed}"
     return Table(heads, rows, caption, note, len(within) + 2)
 
 
@@ -119,7 +124,7 @@ def _compared(comparison: Comparison | None, measure: Measure) -> tuple[str, ...
     if not comparison.few:
         ranked = (_p(comparison.p), _p(comparison.corrected))
     return (
-        _NOTHING if ratio is None else _unlimited(ratio),
+        _NOTHING if ratio is None else _unlimited(ratio, ratio_decimals),
         _difference(comparison.difference, measure),
         _NOTHING if chance is None or comparison.few else _spread(chance, share),
         str(comparison.pairs),
@@ -127,7 +132,7 @@ def _compared(comparison: Comparison | None, measure: Measure) -> tuple[str, ...
     )
 
 
-def _unlimited(interval: Interval) -> str:
+def _unlimited(interval: Interval, decimals_of: Callable[[float, float, float], int]) -> str:
     """Return a ratio or a difference, which may be infinite."""
     decimals = decimals_of(interval.value, interval.low, interval.high)
     value, low, high = (
@@ -144,8 +149,8 @@ def _difference(difference: Interval | None, measure: Measure) -> str:
         return _NOTHING
     if not measure.unit:
         values = (100 * bound for bound in (difference.value, difference.low, difference.high))
-        return f"{_unlimited(Interval(*values))} points"
-    return _unlimited(difference)
+        return f"{_unlimited(Interval(*values), decimals_of)} points"
+    return _unlimited(difference, decimals_of)
 
 
 def _spread(interval: Interval, measure: Measure) -> str:

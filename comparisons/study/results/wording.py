@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from math import inf, isfinite
+from typing import Final
 
 from comparisons.study.kinds import Measure
 
-NEVER = "never"
+NEVER: Final = "never"
 """Stands for a number that was never reached."""
+CALLED: Final = {"iqm": "IQM", "median": "median", "mean": "mean"}
+"""Statistics by their names."""
 
 
 def plain(value: float, decimals: int | None = None) -> str:
@@ -43,6 +46,17 @@ def decimals_of(value: float, low: float = inf, high: float = inf) -> int:
     return next((i for i in range(9) if round(size, i) >= 10.0 ** (2 - i)), 9) if size else 0
 
 
+def ratio_decimals(value: float, low: float, high: float) -> int:
+    """Return how many decimals a ratio needs so that it, and its bounds, show as 1 only where they are.
+
+    >>> ratio_decimals(1.42, 1.38, 1.47), ratio_decimals(1.0052, 1.0004, 1.0098), ratio_decimals(1.1, 1, 1.2)
+    (2, 4, 2)
+    """
+    decimals = decimals_of(value, low, high)
+    others = [each for each in (value, low, high) if isfinite(each) and abs(each - 1) > 1e-9]
+    return next((i for i in range(decimals, 6) if all(round(each, i) != 1 for each in others)), 6)
+
+
 def number(value: float, measure: Measure, decimals: int | None = None) -> str:
     """Return a measure's number as text.
 
@@ -51,12 +65,18 @@ def number(value: float, measure: Measure, decimals: int | None = None) -> str:
     >>> steps = Measure("steps", "steps to the goal", "steps", "less")
     >>> [number(value, steps) for value in (5423.4, 14.26, 1.5, 0, float("inf"))]
     ['5,423', '14.3', '1.50', '0', 'never']
-    >>> number(0.9342, Measure("optimal", "share of optimal affordances", "", "more"))
-    '93.4 %'
+    >>> optimal = Measure("optimal", "share of optimal affordances", "", "more")
+    >>> number(0.9342, optimal), number(0.9998, optimal), number(1.0, optimal)
+    ('93.4 %', '99.98 %', '100.0 %')
     """
     if not isfinite(value):
         return NEVER
-    return plain(value, decimals) if measure.unit else f"{plain(100 * value, 1)} %"
+    if measure.unit:
+        return plain(value, decimals)
+    # What is nearly all or nearly nothing must not look like all or nothing.
+    exact = min(abs(value), abs(1 - value)) < 1e-9
+    shown = 1 if exact else next((i for i in range(1, 6) if round(100 * value, i) not in (0, 100)), 6)
+    return f"{plain(100 * value, shown)} %"
 
 
 def spread(value: float, low: float, high: float, measure: Measure, *, unit: bool = False) -> str:
@@ -90,37 +110,51 @@ def spread(value: float, low: float, high: float, measure: Measure, *, unit: boo
     return f"{first} ({least if most == NEVER else least.removesuffix(' %')} to {most})"
 
 
-def reach(value: float, low: float, high: float, least: float) -> str:
+def reach(low: float, high: float, decimals: int, least: float) -> str:
     """Return what a 95 % interval says of a difference or a ratio.
 
     Parameters
     ----------
-    value, low, high
-        The difference or ratio, and the bounds.
+    low, high
+        The bounds.
+    decimals
+        How many of them to show.
     least
         What bounds nothing from below: 0 of ratios, minus infinity of differences.
 
     Examples
     --------
-    >>> reach(1.4, 1.3, 1.55, 0), reach(1.4, 1.3, float("inf"), 0), reach(1.4, 0, 2.5, 0)
+    >>> reach(1.3, 1.55, 2, 0), reach(1.3, float("inf"), 2, 0), reach(0, 2.5, 2, 0)
     ('95 % 1.30 to 1.55', '95 % at least 1.30', '95 % at most 2.50')
-    >>> reach(1.4, 0, float("inf"), 0)
+    >>> reach(0, float("inf"), 2, 0)
     '95 %: anything'
     """
-    decimals = decimals_of(value, low, high)
     first, second = (plain(bound, decimals) if isfinite(bound) else "" for bound in (low, high))
     if high == inf:
         return f"95 % at least {first}" if low > least else "95 %: anything"
     return f"95 % {first} to {second}" if low > least else f"95 % at most {second}"
 
 
+def article(measure: Measure) -> str:
+    """Return what was measured, as it stands after "of" or "in".
+
+    >>> article(Measure("optimal", "share of optimal affordances")), article(Measure("steps", "steps a run"))
+    ('the share of optimal affordances', 'steps a run')
+    """
+    return f"the {measure.about}" if measure.about.startswith("share") else measure.about
+
+
 def chance_of(p: float) -> str:
     """Return a p value.
 
-    >>> chance_of(0.0321), chance_of(1.0), chance_of(1e-7)
-    ('p = 0.032', 'p = 1', 'p < 0.0001')
+    >>> chance_of(0.0321), chance_of(1.0), chance_of(1e-7), chance_of(0.0496)
+    ('p = 0.032', 'p = 1', 'p < 0.0001', 'p = 0.0496')
     """
-    return "p < 0.0001" if p < 0.0001 else f"p = {p:.2g}"
+    if p < 0.0001:
+        return "p < 0.0001"
+    text = f"{p:.2g}"
+    # Which side of 0.05 it is on must be seen.
+    return f"p = {text}" if text != "0.05" else f"p = {p:.3g}"
 
 
 def counted(count: int, noun: str) -> str:

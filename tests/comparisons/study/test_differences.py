@@ -47,6 +47,18 @@ def test_runs_of_one_store_only() -> None:
     assert sorted(line.partition("seed ")[2] for line in lines[4:]) == ["2, gamma 1.0", "3, gamma 0.5"]
 
 
+def test_the_same_settings_of_another_version_are_told_apart() -> None:
+    """Where a kind's version or a file's text makes other runs of the same settings, that is told."""
+    one = run(0)
+    newer = replace(one, spec=replace(one.spec, version=2))
+    lines = diff(Shelf(one), Shelf(newer)).text("a", "b").splitlines()
+    assert lines[2::2] == [f"  {one.spec.hash}  seed 0, version 1", f"  {newer.spec.hash}  seed 0, version 2"]
+    edited = [replace(one, spec=replace(one.spec, files={"my.maze": text})) for text in ("#", "##")]
+    first, second = diff(*map(Shelf, edited)).text().splitlines()[2::2]
+    assert "seed 0, text of my.maze " in first
+    assert first.split()[-1] != second.split()[-1]
+
+
 def test_results_that_differ() -> None:
     """A measure that differs is told with both numbers, and with the provenance that may explain it."""
     other = run(0, torch="2.14", measures={"steps": 130.5, "never": 3.0})

@@ -1,5 +1,6 @@
 """Paired comparisons: against enumeration, against scipy's own, by hand, and by how often they err."""
 
+from dataclasses import replace
 from itertools import product
 from math import inf
 from random import Random
@@ -11,8 +12,9 @@ from hypothesis import strategies as st
 from scipy.stats import rankdata, wilcoxon
 from study_rows import COST, OPTIMAL, RETURN, STEPS, samples
 
-from comparisons.study.results.paired import compare, correct, holm, paired_gaps, signed_rank
+from comparisons.study.results.paired import compare, correct, paired_gaps
 from comparisons.study.results.samples import Samples
+from comparisons.study.results.significance import holm, leaning, signed_rank
 from comparisons.study.results.statistics import estimate
 
 CASES = 300
@@ -70,6 +72,14 @@ def test_holm_lies_between_nothing_and_bonferroni(values: list[float]) -> None:
         assert before <= after <= min(len(values) * before, 1.0)
     order = sorted(range(len(values)), key=lambda i: values[i])
     assert [corrected[i] for i in order] == sorted(corrected)
+
+
+@given(st.lists(st.integers(-5, 5), max_size=9))
+def test_the_leaning_is_that_of_the_test(gaps: list[int]) -> None:
+    """Whichever signs have the larger sum of ranks, pairs that do not differ having none."""
+    scipys = wilcoxon(gaps, alternative="greater", method="asymptotic") if any(gaps) else None
+    middle = sum(rankdata(np.abs([gap for gap in gaps if gap]))) / 2
+    assert leaning(gaps) == (np.sign(scipys.statistic - middle) if scipys else 0)
 
 
 def test_runs_of_the_same_task_and_seed_are_pairs() -> None:
@@ -158,6 +168,42 @@ def test_correction_counts_the_tests() -> None:
     assert (strong.p, alone.corrected, first.corrected) == (0.03125, 0.03125, 0.0625)
     assert (alone.significant, first.significant, second.significant) == (True, False, False)
     assert (alone.powerless, first.powerless, first.tests) == (False, True, 2)
+
+
+def test_what_could_show_a_difference_is_not_called_powerless() -> None:
+    """Six pairs cannot be the surest of two tests, but they can be the second one, beside a sure one."""
+    weak = compare(samples([1.0, 2, 3, 4, 5, 9]), samples([2.0, 1, 4, 3, 6, 9]))
+    sure = compare(samples(range(20, 40)), samples(range(20)))
+    assert correct([sure, weak])[1].powerless is False
+    strongest = compare(samples(range(10, 16)), samples(range(6)))
+    assert correct([sure, strongest])[1].significant
+    assert correct([sure, weak])[1].least == correct([sure, strongest])[1].corrected
+
+
+@given(st.lists(st.tuples(st.integers(1, 12), st.integers(1, 64)), min_size=1, max_size=6), st.integers(0, 5))
+def test_the_least_correction_is_that_of_pairs_that_all_agree(
+    tests: list[tuple[int, int]], which: int
+) -> None:
+    """What a comparison could come to at best is what it comes to when all of its pairs lean one way."""
+    any_one = compare(samples([1.0]), samples([2.0]))
+    which %= len(tests)
+    given = [replace(any_one, pairs=pairs, p=min(times * 2.0 ** (1 - pairs), 1)) for pairs, times in tests]
+    agreed = [*given[:which], replace(given[which], p=2.0 ** (1 - tests[which][0])), *given[which + 1 :]]
+    assert correct(given)[which].least == pytest.approx(correct(agreed)[which].corrected)
+
+
+def contrary() -> tuple[list[float], list[float]]:
+    """Return runs of which most are a little below their twins, and four far above."""
+    second = [100.0 * seed for seed in range(1, 31)]
+    return [4000.0] * 4 + [steps - 1 for steps in second[4:]], second
+
+
+def test_the_side_ahead_is_that_of_the_pairs() -> None:
+    """Where most pairs lean one way and the mean another, both are known."""
+    found = compare(*map(samples, contrary()), "mean")
+    assert found.significant
+    assert (found.ahead, found.contrary, found.clear) == (-1, True, True)
+    assert found.ratio.low > 1
 
 
 @pytest.mark.slow

@@ -7,13 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import bootstrap, mannwhitneyu, norm, trim_mean
-from study_rows import COST, OPTIMAL, RETURN, STEPS, Kept, Planned, Shelf, rows, samples
+from study_rows import COST, OPTIMAL, RETURN, STEPS, rows, samples
 
 from comparisons.intervals import wilson
-from comparisons.study.kinds import Result
+from comparisons.study.kinds import kind
 from comparisons.study.results.resampling import expanded_tail, inner, resampled
-from comparisons.study.results.rows import Row, missing_of, rows_of
-from comparisons.study.results.samples import Samples, refuse_few, samples_of, worst
+from comparisons.study.results.samples import Samples, samples_of, worst
 from comparisons.study.results.statistics import (
     STATISTICS,
     aggregate,
@@ -21,9 +20,7 @@ from comparisons.study.results.statistics import (
     estimate,
     improvement,
     profile,
-    share_reached,
 )
-from comparisons.study.spec import RunSpec
 from worlds import UserError
 
 CASES = 300
@@ -122,7 +119,6 @@ def test_too_few_runs_have_no_interval() -> None:
     one = estimate(samples([7.0]))
     assert (one.value, one.low, one.high, one.bounded) == (7, -inf, inf, False)
     assert estimate(samples()) is None
-    assert share_reached(samples()) is None
     assert [estimate(samples(range(n))).few for n in (4, 5)] == [True, False]
     assert not estimate(samples(range(9), [1.0])).bounded
 
@@ -131,12 +127,6 @@ def test_an_unknown_statistic_is_told() -> None:
     """A statistic's name with a slip is answered with the name that was meant."""
     with pytest.raises(UserError, match="meen: there is no such statistic; did you mean 'mean'"):
         checked_statistic("meen")
-
-
-def test_share_reached_is_wilsons() -> None:
-    """The share of runs that got there has Wilson's interval."""
-    found = share_reached(samples([1, 2, inf, 4], [inf, 6, 7, 8]))
-    assert (found.value, found.low, found.high) == (0.75, *wilson(6, 8))
 
 
 @given(st.lists(st.one_of(st.integers(0, 9).map(float), st.just(inf)), min_size=1, max_size=20))
@@ -179,10 +169,14 @@ def test_improvement_is_mann_and_whitneys(first: list[float], second: list[float
 
 
 def test_complete_separation_is_no_certainty() -> None:
-    """Five seeds that all beat five others leave room for chance."""
+    """Where resampling shows no spread, since all seeds win, lose or tie, there is doubt left."""
     found = improvement(samples(range(5)), samples(range(10, 15)))
     assert (found.value, found.low, found.high) == (1, *wilson(5, 5))
     assert improvement(samples([1.0, 2.0]), Samples(STEPS, {"another task": {0: 1.0}})) is None
+    half = improvement(samples(range(5), range(10, 15)), samples(range(10, 15), range(5)))
+    assert (half.value, half.low, half.high) == (0.5, *wilson(2, 5))
+    alike = improvement(samples([3.0] * 20), samples([3.0] * 20))
+    assert (alike.value, alike.low, alike.high) == (0.5, *wilson(10, 20))
 
 
 def test_what_has_no_better_is_not_ranked() -> None:
@@ -197,6 +191,8 @@ def test_what_has_no_better_is_not_ranked() -> None:
 def test_none_counts_by_what_it_means() -> None:
     """Steps never reached are infinitely many; a share or a cost of nothing is left out and counted."""
     assert [worst(measure) for measure in (STEPS, RETURN, OPTIMAL, COST)] == [inf, -inf, None, None]
+    # Learners without tables do not need infinitely large ones.
+    assert worst(kind("learn").measure("stored_values")) is None
     for measure, kept in ((STEPS, [3, inf]), (RETURN, [3, -inf]), (OPTIMAL, [3]), (COST, [3])):
         found = samples_of(rows(measure, {"1": [3, None]}), measure)
         assert (found.values.tolist(), found.untold) == (kept, 2 - len(kept))
@@ -212,31 +208,6 @@ def test_tasks_keep_seeds_apart() -> None:
         UserError, match="seed 0 was run twice, with gamma 1, graph A and with gamma 1, graph B"
     ):
         samples_of(both, STEPS)
-
-
-def test_few_seeds_are_refused() -> None:
-    """Ranking needs five seeds at every combination of levels, and says where they lack."""
-    enough = rows(STEPS, {"1": range(5), "0.9": range(5)})
-    refuse_few(enough)
-    with pytest.raises(UserError, match=r"gamma: gamma 0.9 has 4 seeds, and ranking needs 5; give it more"):
-        refuse_few(enough[:-1], "gamma")
-    with pytest.raises(UserError, match="this study: no run has a result"):
-        refuse_few([])
-    with pytest.raises(UserError, match="this study: there is 1 seed, and ranking needs 5"):
-        refuse_few([Row({}, 0, "", Result({}))])
-
-
-def test_rows_are_the_planned_runs_that_are_kept() -> None:
-    """Rows stand in the plan's order with the store's results; the others are missing."""
-    plan = [Planned(RunSpec("learn", 1, {"gamma": 1.0}, seed), {"gamma": "1"}) for seed in range(3)]
-    stray = Kept(RunSpec("learn", 1, {"gamma": 0.5}, 0), Result({"steps": 0.0}))
-    store = Shelf(stray, *(Kept(run.spec, Result({"steps": 1.0 * run.spec.seed})) for run in plan[:0:-1]))
-    found = rows_of(plan, store)
-    assert [(row.seed, row.hash, row.result.measures["steps"]) for row in found] == [
-        (1, plan[1].spec.hash, 1.0),
-        (2, plan[2].spec.hash, 2.0),
-    ]
-    assert missing_of(plan, found) == [plan[0]]
 
 
 def test_resamples_of_one_number_are_refused() -> None:

@@ -127,7 +127,7 @@ def test_the_comparisons_table() -> None:
     """Each comparison has its ratio, its difference, the chance to be better and both p values."""
     by_level = {"1": [10.0 + seed for seed in range(8)], "2": [20.0 + 2 * seed for seed in range(8)]}
     by_level["3"], by_level["4"] = [None] * 8, [1.0] * 3
-    table = comparisons_table(answers(Asked(), STEPS, rows(STEPS, by_level)), STEPS)
+    table = comparisons_table(answers(Asked(), STEPS, rows(STEPS, by_level)).told, STEPS)
     assert table.columns[:3] == ("gamma", "against", "ratio")
     assert table.rows[0][:3] == ("2", "1", "2.00 (2.00 to 2.00)")
     assert table.rows[0][5:] == ("8", "0.0078", "0.016")
@@ -140,12 +140,12 @@ def test_the_comparisons_table() -> None:
 
 def test_comparisons_of_shares_and_of_nothing() -> None:
     """Differences of shares are points; what has no better has no chance; no pair leaves dashes."""
-    shares = answers(Asked(OPTIMAL.name), OPTIMAL, rows(OPTIMAL, {"1": [0.5] * 6, "2": [0.25] * 6}))
+    shares = answers(Asked(OPTIMAL.name), OPTIMAL, rows(OPTIMAL, {"1": [0.5] * 6, "2": [0.25] * 6})).told
     assert comparisons_table(shares, OPTIMAL).rows[0][2:4] == (DASH, "-25.0 (-25.0 to -25.0) points")
-    costs = answers(Asked(COST.name), COST, rows(COST, {"1": [2.0] * 6, "2": [3.0] * 6}))
+    costs = answers(Asked(COST.name), COST, rows(COST, {"1": [2.0] * 6, "2": [3.0] * 6})).told
     assert comparisons_table(costs, COST).rows[0][4] == DASH
     there = rows(STEPS, {"1": [2.0] * 6})
-    nothing = answers(Asked(), STEPS, there, rows(STEPS, {"2": [0.0] * 6}))
+    nothing = answers(Asked(), STEPS, there, rows(STEPS, {"2": [0.0] * 6})).told
     assert comparisons_table(nothing, STEPS).rows[0][2:] == (DASH, DASH, DASH, "0", DASH, DASH)
 
 
@@ -159,10 +159,18 @@ def test_numbers_keep_three_digits(value: float) -> None:
 
 @pytest.mark.parametrize(
     ("value", "words"),
-    [(0.99996, "100.0 %"), (-0.0004, "0.0 %"), (1 / 3, "33.3 %")],
+    [
+        (1.0, "100.0 %"),
+        (0.99996, "99.996 %"),
+        (0.0002, "0.02 %"),
+        (0.0, "0.0 %"),
+        (1e-12, "0.0 %"),
+        (-0.0004, "-0.04 %"),
+        (1 / 3, "33.3 %"),
+    ],
 )
 def test_shares_are_in_per_cent(value: float, words: str) -> None:
-    """A share has one decimal of a per cent."""
+    """A share has one decimal of a per cent, or more where it would look like all or nothing."""
     assert number(value, OPTIMAL) == words
 
 
