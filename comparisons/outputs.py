@@ -44,15 +44,23 @@ def refuse_existing(out: Path) -> None:
 
 
 @contextmanager
-def new_directory(out: Path) -> Iterator[Path]:
+def new_directory(out: Path, *, replace: bool = False) -> Iterator[Path]:
     """Yield a directory that takes the name `out` if all goes well, and vanishes if not.
+
+    Parameters
+    ----------
+    out
+        The name.
+    replace
+        Whether it takes the place of what has that name; it stays what it was until then.
 
     Raises
     ------
     UserError
-        If `out` exists or cannot be made.
+        If `out` exists and is not to be replaced, or cannot be made.
     """
-    refuse_existing(out)
+    if not replace:
+        refuse_existing(out)
     try:
         parent = out.absolute().parent
         parent.mkdir(parents=True, exist_ok=True)
@@ -62,10 +70,27 @@ def new_directory(out: Path) -> Iterator[Path]:
     try:
         yield made
         made.chmod(0o755)
-        refuse_existing(out)
-        made.rename(out)
+        if replace and (out.exists() or out.is_symlink()):
+            _exchange(made, out)
+        else:
+            refuse_existing(out)
+            made.rename(out)
     finally:
         shutil.rmtree(made, ignore_errors=True)
+
+
+def _exchange(made: Path, out: Path) -> None:
+    """Move a directory to where another one is, which is removed; it comes back if that fails."""
+    aside = Path(tempfile.mkdtemp(prefix=f".{out.name}-", dir=made.parent))
+    try:
+        out.rename(aside / "before")
+        try:
+            made.rename(out)
+        except BaseException:
+            (aside / "before").rename(out)
+            raise
+    finally:
+        shutil.rmtree(aside, ignore_errors=True)
 
 
 def write_json(path: Path, content: Any) -> None:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import string
-from collections.abc import Callable
-from contextlib import AbstractContextManager
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import wraps
 from io import BytesIO
@@ -13,6 +14,7 @@ from typing import Any, Final, ParamSpec
 
 from matplotlib import style
 from matplotlib.figure import Figure
+from matplotlib.font_manager import findfont, get_font
 
 P = ParamSpec("P")
 Look = dict[str, Any]
@@ -35,6 +37,7 @@ FLOOR: Final = "#DCEAF7"
 PNG_DPI: Final = 200
 """Dots an inch of every PNG."""
 
+_FONT: Final = "DejaVu Sans"  # matplotlib brings it: the same letters on every machine
 _SETTINGS: Final[Look] = {
     "axes.edgecolor": GREY,
     "axes.grid": False,
@@ -46,7 +49,7 @@ _SETTINGS: Final[Look] = {
     "axes.titlesize": 9,
     "figure.constrained_layout.h_pad": 0.07,
     "figure.facecolor": "white",
-    "font.family": ["DejaVu Sans"],  # matplotlib brings it: the same letters on every machine
+    "font.family": [_FONT],
     "font.size": 8.5,
     "legend.fontsize": 8,
     "legend.frameon": False,
@@ -62,9 +65,27 @@ _SETTINGS: Final[Look] = {
 }
 
 
-def house_style() -> AbstractContextManager[None]:
-    """Return a context in which matplotlib draws in our style, whatever the user's own settings are."""
-    return style.context(["default", _SETTINGS])
+@contextmanager
+def house_style() -> Iterator[None]:
+    """Make matplotlib draw in our style, whatever the user's own settings are."""
+    with warnings.catch_warnings(), style.context(["default", _SETTINGS]):
+        # A box stands for a letter that the font has not; reports say so once (`letters_missing`).
+        warnings.filterwarnings("ignore", "Glyph .* missing from font", UserWarning)
+        yield
+
+
+def letters_missing(text: str) -> str:
+    """Return the letters of a text that figures cannot show, each once.
+
+    Examples
+    --------
+    >>> letters_missing("na\u00efve \u03b3 \u5b66\u7fd2 \u5b66")
+    '\u5b66\u7fd2'
+    """
+    font = get_font(findfont(_FONT))
+    return "".join(
+        dict.fromkeys(sign for sign in text if not (sign.isspace() or font.get_char_index(ord(sign))))
+    )
 
 
 def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-import shutil
-import tempfile
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +18,7 @@ from comparisons.study.figures.choosing import plates_of
 from comparisons.study.figures.grouping import About, parts_of, shown_measures
 from comparisons.study.figures.plate import Plate, numbers_csv, numbers_table
 from comparisons.study.figures.saving import save_three
-from comparisons.study.gathering import Gathered, gather, state_table, study_in
+from comparisons.study.gathering import Gathered, gather, study_in
 from comparisons.study.kinds import kind
 from comparisons.study.report_parts import (
     cpu_seconds,
@@ -32,16 +29,17 @@ from comparisons.study.report_parts import (
     provenance_tables,
     run_sentences,
     settings_table,
+    unfinished_table,
     warnings,
 )
 from comparisons.study.results.answers import answers
 from comparisons.study.results.summaries import comparisons_table, study_table
 from comparisons.study.results.tables import Table
-from comparisons.style import Picture
+from comparisons.style import Picture, letters_missing
 from worlds import UserError
 
 PAGE: Final = "report.html"
-_BRACKETS: Final = re.compile(r"\([^()]{1,40}\)")
+_UNBROKEN: Final = re.compile(r"\([^()]{1,40}\)|^< .*")
 _MEASURES: Final = 4  # that fit on the page's width
 _SENTENCES: Final = 8
 _FOLDED: Final = "parts"
@@ -78,10 +76,10 @@ def report_study(directory: Path, out: Path | None = None, track: Track = untrac
         If there is no store, its study cannot be read, or the report cannot be written.
     """
     found = gather(*study_in(directory))
-    name = directory.absolute().name
+    name = directory.resolve().name
     place = directory / "report" if out is None else out
     try:
-        with new_directory(place) if out is not None else _made_anew(place) as made:
+        with new_directory(place, replace=out is None) as made:
             _write(found, name, made, track)
     except OSError as error:
         raise UserError(
@@ -90,31 +88,14 @@ def report_study(directory: Path, out: Path | None = None, track: Track = untrac
     return place / PAGE, found.whole
 
 
-@contextmanager
-def _made_anew(place: Path) -> Iterator[Path]:
-    """Yield a folder that takes the place of what is there if all goes well, and vanishes if not."""
-    made = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
-    try:
-        yield made
-        made.chmod(0o755)
-        if place.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{place.name}-", dir=place.parent))
-            place.rename(old / "before")
-            made.rename(place)
-            shutil.rmtree(old, ignore_errors=True)
-        else:
-            made.rename(place)
-    finally:
-        shutil.rmtree(made, ignore_errors=True)
-
-
 def about_study(study: Study) -> About:
     """Return what figures need to know of a study."""
     asked, answer = kind(study.kind), study.answer
     factors = {factor.name: factor.labels for factor in study.factors}
     if answer is None:
         several = (name for name, labels in factors.items() if len(labels) > 1)
-        return About(asked, factors, asked.measures[0], next(several, next(iter(factors), None)))
+        compared = next(several, next(iter(factors), None))
+        return About(asked, factors, asked.measures[0], compared)
     measure = asked.measure(answer.measure)
     return About(asked, factors, measure, answer.compare, answer.against, answer.statistic)
 
@@ -163,9 +144,10 @@ def _results(found: Gathered, about: About) -> tuple[list[str], dict[str, Table]
         return [
             "The study file declares no answer; the table of results has all there is to compare."
         ], tables
-    told = answers(study.answer, about.measure, found.rows, absent)
-    tables["comparisons"] = comparisons_table(told, about.measure, "How the levels compare.")
-    return [_sentence(one.sentence) for one in told], tables
+    answered = answers(study.answer, about.measure, found.rows, absent)
+    tables["comparisons"] = comparisons_table(answered.told, answered.measure, "How the levels compare.")
+    sentences = [*answered.lead, *(one.sentence for one in answered.told)]
+    return [_sentence(words) for words in sentences], tables
 
 
 def render(
@@ -202,7 +184,9 @@ def render(
         told.append(
             f"The study file asks for figures that these runs have nothing for: {', '.join(missing)}."
         )
-    states = [state_table(found)] if not found.whole else []
+    boxes = letters_missing("".join(label for factor in study.factors for label in factor.labels))
+    if boxes and plates:
+        told.append(f"Figures show boxes where labels hold letters that their font has not: {boxes}.")
     environment = Environment(
         loader=PackageLoader("comparisons"),
         autoescape=True,
@@ -222,7 +206,7 @@ def render(
         warnings=told,
         cards=_cards(found),
         ran=run_sentences(study),
-        ran_tables=[count(table) for table in (factors_table(study), *states) if table],
+        ran_tables=[count(table) for table in (factors_table(study), unfinished_table(found)) if table],
         settings="" if (fixed := settings_table(study)) is None else count(fixed),
         failures=failure_details(found),
         result_tables=[count(table) for name, table in tables.items() if name != _FOLDED],
@@ -237,6 +221,7 @@ def render(
             }
             for i, plate in enumerate(plates, start=1)
         ],
+        store=name,
         command=f"affordant study report {folder}",
         provenance=provenance_sentences(found),
         provenance_tables=[count(table) for table in provenance_tables(found)],
@@ -255,12 +240,12 @@ class _Counter:
 
     def __call__(self, table: Table) -> str:
         self.count += 1
-        rows = tuple(tuple(_BRACKETS.sub(_unbroken, cell) for cell in row) for row in table.rows)
+        rows = tuple(tuple(_UNBROKEN.sub(_unbroken, cell) for cell in row) for row in table.rows)
         return replace(table, rows=rows, caption=f"Table {self.count}. {table.caption}").html()
 
 
 def _unbroken(found: re.Match[str]) -> str:
-    """Return an interval that stays on one line."""
+    """Return an interval, or a p value, that stays on one line."""
     return found[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 

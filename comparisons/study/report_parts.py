@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 from comparisons.study.declaring.declaration import Study
-from comparisons.study.gathering import Gathered
+from comparisons.study.gathering import Gathered, state_table
 from comparisons.study.results.tables import Table
 from comparisons.study.results.wording import counted
 
@@ -39,6 +40,14 @@ def factors_table(study: Study) -> Table | None:
 def _listed(labels: Sequence[str]) -> str:
     """Return labels in a row, apart from each other even where some hold commas."""
     return ("; " if any("," in label for label in labels) else ", ").join(labels)
+
+
+def unfinished_table(found: Gathered) -> Table | None:
+    """Return where runs have no result, and why; None if all have one."""
+    table = state_table(found)
+    rows = tuple(row for row in table.rows if any(cell != "0" for cell in row[table.labels + 1 :]))
+    caption = "Combinations of which not every run has a result."
+    return replace(table, rows=rows, caption=caption) if rows else None
 
 
 def settings_table(study: Study) -> Table | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,21 +12,18 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 from numpy.typing import NDArray
 
-from comparisons.study.figures.saving import (
-    ONE_COLUMN,
-    TWO_COLUMNS,
+from comparisons.study.figures.panels import (
     Mark,
-    Scale,
-    Spot,
-    cut,
+    entitle,
+    figure_of_panels,
     grid_lines,
     legend_above,
     marks,
-    scale_of,
-    set_scale,
-    short,
 )
-from comparisons.style import Look, grid_of, panel, styled
+from comparisons.study.figures.scales import Scale, Spot, axis_words, scale_of, set_scale, short
+from comparisons.style import Look, styled
+
+_HEIGHTS: Final = (2.1, 1.9)  # inches of a panel, where up to two stand in a row and where three do
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +67,9 @@ class Curves:
 
 
 @styled
-def convergence_figure(panels: Sequence[Curves], abscissa: str = "environment steps") -> Figure:
+def convergence_figure(
+    panels: Sequence[Curves], abscissa: str = "environment steps", *, alike: bool = False
+) -> Figure:
     """Draw learning curves with their bands, a panel for each group or column of the curve.
 
     Where a curve or its band is infinite (too many runs have nothing to show yet), it is left out.
@@ -81,6 +80,8 @@ def convergence_figure(panels: Sequence[Curves], abscissa: str = "environment st
         At least one.
     abscissa
         What the abscissa shows.
+    alike
+        Whether panels have the same ordinate, as they need to be compared with each other.
 
     Examples
     --------
@@ -89,22 +90,14 @@ def convergence_figure(panels: Sequence[Curves], abscissa: str = "environment st
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('environment steps', 'optimal starts, %')
     """
-    rows, columns = grid_of(len(panels), 3 if len(panels) > 4 or len(panels) == 3 else 2)
-    width = ONE_COLUMN if columns == 1 else TWO_COLUMNS
-    figure = Figure((width, 0.35 + rows * (2.1 if columns < 3 else 1.9)), layout="constrained")
+    figure, places, columns = figure_of_panels(len(panels), _HEIGHTS)
     looks = marks(list(dict.fromkeys(label for each in panels for label in each.curves)))
-    for i, each in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        shown = [
-            Spot(*three)
-            for curve in each.curves.values()
-            for three in zip(*(_finite(part) for part in (curve.value, curve.low, curve.high)), strict=True)
-        ]
-        scale = scale_of(shown or [Spot(0, 0, 1)], share=each.share)
+    for i, (each, axes) in enumerate(zip(panels, places, strict=True)):
+        scale = scale_of(_spots(panels if alike else [each]), share=each.share)
         scale = Scale(min(scale.low, 0.0), scale.high, False) if each.share else scale._replace(log=False)
         for label, curve in each.curves.items():
             _band(axes, label, curve, scale, looks[label])
-        axes.set_xlim(left=0)
+        axes.set_xlim(0, max(curve.x[-1] for curve in each.curves.values()))
         axes.xaxis.set_major_locator(MaxNLocator(4 if columns < 3 else 3))
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _place: short(value)))
         set_scale(axes, "y", scale)
@@ -113,22 +106,27 @@ def convergence_figure(panels: Sequence[Curves], abscissa: str = "environment st
             axes.set_xlabel(abscissa)
         if i % columns == 0 or each.label != panels[i - 1].label:
             axes.set_ylabel(each.label)
-        if len(panels) > 1 or each.title:
-            axes.set_title(panel(i, cut(each.title)) if len(panels) > 1 else cut(each.title), loc="left")
+        entitle(axes, i, len(panels), each.title, figure.get_figwidth() / columns - 0.5)
     legend_above(figure)
     return figure
 
 
-def _finite(part: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return a part of a curve with its infinities at the nearest number that it has."""
-    there = part[np.isfinite(part)]
-    return np.clip(part, there.min(), there.max()) if there.size else np.zeros_like(part)
+def _spots(panels: Sequence[Curves]) -> list[Spot]:
+    """Return every number that some panels' curves and bands have."""
+    return [
+        Spot(number, number, number)
+        for each in panels
+        for curve in each.curves.values()
+        for part in (curve.value, curve.low, curve.high)
+        for number in part[np.isfinite(part)].tolist()
+    ]
 
 
 def _band(axes: Axes, label: str, curve: Curve, scale: Scale, mark: Mark) -> None:
     seen = np.isfinite(curve.value)
     value = np.where(seen, curve.value, np.nan)
-    axes.plot(curve.x, value, label=label or None, linewidth=1.2, gid=label or "line", **mark.look)
+    look = mark.curve if seen.any() else mark.look  # matplotlib cannot mark every part of a line without any
+    axes.plot(curve.x, value, label=label or None, linewidth=1.2, gid=label or "line", **look)
     axes.fill_between(
         curve.x,
         np.clip(curve.low, scale.low, scale.high),
@@ -167,31 +165,28 @@ def profiles_figure(
     >>> figure.axes[0].get_xlabel(), [float(end) for end in figure.axes[0].get_ylim()]
     ('steps', [-2.0, 102.0])
     """
-    rows, columns = grid_of(len(panels), 3 if len(panels) > 4 or len(panels) == 3 else 2)
-    width = ONE_COLUMN if columns == 1 else TWO_COLUMNS
-    figure = Figure((width, 0.35 + rows * (2.1 if columns < 3 else 1.9)), layout="constrained")
+    figure, places, columns = figure_of_panels(len(panels), _HEIGHTS)
     looks = marks(list(dict.fromkeys(label for each in panels for label in each.curves)))
     # A share holds from the measure's last number on if it grows, and back from the next one if it falls.
     where: Literal["post", "pre"] = "post" if less else "pre"
     ends = [(curve.x.min(), curve.x.max()) for each in panels for curve in each.curves.values()]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    for i, each in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
+    for i, (each, axes) in enumerate(zip(panels, places, strict=True)):
         for label, curve in each.curves.items():
             look = looks[label]
-            axes.step(curve.x, curve.value, where=where, label=label or None, linewidth=1.2, **look.look)
+            axes.step(curve.x, curve.value, where=where, label=label or None, linewidth=1.2, **look.curve)
             # Where no run or every run is, the interval is as wide as ever, and bands would hide each other.
             among = ((curve.value > 0) & (curve.value < 100)).tolist()
             band: Look = {"step": where, "color": look.colour, "alpha": 0.16, "linewidth": 0}
             axes.fill_between(curve.x, curve.low, curve.high, where=among, **band)
-        set_scale(axes, "x", Scale(low, high if high > low else low + 1, log and low > 0), 4)
+        scale = Scale(low, high if high > low else low + 1, bool(log and low > 0))
+        set_scale(axes, "x", scale, 4)
         axes.set_ylim(-2, 102)
         grid_lines(axes, "y")
         if i >= len(panels) - columns:
-            axes.set_xlabel(abscissa)
+            axes.set_xlabel(axis_words(abscissa, scale, figure.get_figwidth() / columns - 0.5))
         if i % columns == 0:
             axes.set_ylabel(each.label)
-        if len(panels) > 1 or each.title:
-            axes.set_title(panel(i, cut(each.title)) if len(panels) > 1 else cut(each.title), loc="left")
+        entitle(axes, i, len(panels), each.title, figure.get_figwidth() / columns - 0.5)
     legend_above(figure)
     return figure

@@ -12,25 +12,24 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 
-from comparisons.study.figures.saving import (
+from comparisons.study.figures.panels import (
     ONE_COLUMN,
     TWO_COLUMNS,
-    WHOLE,
     Mark,
-    Scale,
-    Spot,
-    cut,
+    cut_apart,
+    entitle,
+    figure_of_panels,
     grid_lines,
     legend_above,
     marks,
-    scale_of,
-    set_scale,
 )
-from comparisons.style import GREY, INK, Look, grid_of, panel, styled
+from comparisons.study.figures.scales import WHOLE, Scale, Spot, axis_words, scale_of, set_scale
+from comparisons.style import GREY, INK, Look, grid_of, styled
 
 _DIVERGING: Final = LinearSegmentedColormap.from_list("worse_better", ["#E58A3C", "#FFFFFF", "#2C7FB8"])
 _UPRIGHT: Final = 8  # letters that fit below a field
-_NEVER: Final = " (hollow: never reached)"
+_LONG: Final = 20  # letters of a label that leaves no room beside it in a column
+_HEIGHTS: Final = (2.2, 1.9)  # inches of a panel, where up to two stand in a row and where three do
 
 
 @dataclass(frozen=True)
@@ -62,13 +61,15 @@ class Estimates:
 
 
 @styled
-def estimates_figure(panels: Sequence[Estimates], reference: float | None = None) -> Figure:
+def estimates_figure(panels: Sequence[Estimates], name: str = "", reference: float | None = None) -> Figure:
     """Draw estimates as dots with their 95 % intervals: a row for each level, a panel for each measure.
 
     Parameters
     ----------
     panels
         At least one. Levels and colours stand in the order in which they first come.
+    name
+        What the levels are of, above them; "" for nothing.
     reference
         Where a dashed line marks that there is no difference.
 
@@ -80,11 +81,13 @@ def estimates_figure(panels: Sequence[Estimates], reference: float | None = None
     ['1', '0.9']
     """
     levels, colours = _levels(panels), list(dict.fromkeys(c for each in panels for c in each.spots))
+    names = list(cut_apart(levels).values())
+    longest = max(map(len, names), default=0)
     rows, columns = grid_of(len(panels), 2)
     high = 0.42 + len(levels) * (0.14 + 0.115 * len(colours))
-    figure = Figure(
-        (ONE_COLUMN if columns == 1 else TWO_COLUMNS, 0.3 + rows * (high + 0.2)), layout="constrained"
-    )
+    width = ONE_COLUMN if columns == 1 and longest <= _LONG else TWO_COLUMNS
+    figure = Figure((width, 0.3 + rows * (high + 0.2)), layout="constrained")
+    inches = (width - 0.075 * longest) / columns - 0.2
     looks = marks(colours)
     for i, each in enumerate(panels):
         axes = figure.add_subplot(rows, columns, i + 1)
@@ -99,31 +102,32 @@ def estimates_figure(panels: Sequence[Estimates], reference: float | None = None
             label: Look = {"label": colour or None, "color": looks[colour].colour, "linestyle": ""}
             axes.plot([], [], marker=looks[colour].marker, markersize=4, **label)
         axes.set_ylim(len(levels) - 0.45, -0.55)
-        axes.set_yticks(
-            range(len(levels)), list(map(cut, levels)) if i % columns == 0 else [""] * len(levels), color=INK
-        )
+        axes.set_yticks(range(len(levels)), names if i % columns == 0 else [""] * len(levels), color=INK)
         axes.tick_params(axis="y", length=0)
+        if i % columns == 0 and name:
+            above: Look = {"xytext": (-4, 3), "textcoords": "offset points", "ha": "right", "color": GREY}
+            axes.annotate(name, (0, 1), xycoords="axes fraction", **above)
         grid_lines(axes, "x")
-        axes.set_xlabel(each.label + _NEVER * any(scale.beyond))
-        if len(panels) > 1 or each.title:
-            axes.set_title(panel(i, cut(each.title)) if len(panels) > 1 else cut(each.title), loc="left")
+        axes.set_xlabel(axis_words(each.label, scale, inches))
+        entitle(axes, i, len(panels), each.title, inches)
     legend_above(figure)
     return figure
 
 
 def _dot(axes: Axes, spot: Spot, place: float, scale: Scale, mark: Mark) -> None:
-    """Draw one estimate; what is infinite stands hollow at the axis's end."""
+    """Draw one estimate with its interval."""
     low, high = scale.inside(spot.low), scale.inside(spot.high)
     axes.plot([low, high], [place, place], color=mark.colour, linewidth=1.2, zorder=2)
-    fill = mark.colour if isfinite(spot.value) else "white"
-    look: Look = {
-        "color": mark.colour,
-        "markerfacecolor": fill,
-        "clip_on": False,
-        "zorder": 3,
-        "in_layout": False,
-    }
-    axes.plot([scale.inside(spot.value)], [place], marker=mark.marker, markersize=4.2, **look)
+    _mark(axes, (scale.inside(spot.value), place), spot, mark, 4.2)
+
+
+def _mark(axes: Axes, at: tuple[float, float], spot: Spot, mark: Mark, size: float) -> None:
+    """Draw an estimate's mark: hollow if it was not reached, small if it rests on few seeds."""
+    look: Look = {"color": mark.colour, "clip_on": False, "zorder": 3, "in_layout": False}
+    look["markerfacecolor"] = mark.colour if isfinite(spot.value) else "white"
+    axes.plot(
+        *([each] for each in at), marker=mark.marker, markersize=size * (0.5 if spot.few else 1), **look
+    )
 
 
 @styled
@@ -146,24 +150,19 @@ def over_figure(panels: Sequence[Estimates], name: str, reference: float | None 
     >>> figure.axes[0].get_xlabel(), figure.axes[0].lines[0].get_xdata().tolist()
     ('obstacles', [1.0, 6.0, 12.0])
     """
-    rows, columns = grid_of(len(panels), 3 if len(panels) > 4 or len(panels) == 3 else 2)
-    figure = Figure(
-        (ONE_COLUMN if columns == 1 else TWO_COLUMNS, 0.35 + rows * (2.2 if columns < 3 else 1.9)),
-        layout="constrained",
-    )
+    figure, grid, columns = figure_of_panels(len(panels), _HEIGHTS)
     looks = marks(list(dict.fromkeys(c for each in panels for c in each.spots)))
     places = sorted({float(level) for each in panels for by in each.spots.values() for level in by})
     alike = len({each.label for each in panels}) == 1
     common = _scale([spot for each in panels for spot in each.all], reference, share=panels[0].share)
-    for i, each in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
+    for i, (each, axes) in enumerate(zip(panels, grid, strict=True)):
         scale = common if alike else _scale(each.all, reference, share=each.share)
         if reference is not None:
             axes.axhline(reference, color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), gid="reference")
-        for colour, by_level in each.spots.items():
-            if not by_level:
-                continue
-            _line(axes, colour, by_level, scale, looks[colour])
+        for j, (colour, by_level) in enumerate(each.spots.items(), start=1):
+            if by_level:  # marks that lie on each other are seen if the lower ones are larger
+                size = 3.2 + 0.5 * (len(each.spots) - j)
+                _line(axes, colour, by_level, scale, looks[colour], size=size)
         set_scale(axes, "y", scale)
         if len(places) <= 12 and places == [round(place) for place in places]:
             every = 1 if len(places) <= 7 or columns == 1 else 2
@@ -172,20 +171,22 @@ def over_figure(panels: Sequence[Estimates], name: str, reference: float | None 
         if i >= len(panels) - columns:
             axes.set_xlabel(name)
         if i % columns == 0 or not alike:
-            axes.set_ylabel(each.label + ("\n" + _NEVER.strip()) * any(scale.beyond))
-        if len(panels) > 1 or each.title:
-            axes.set_title(panel(i, cut(each.title)) if len(panels) > 1 else cut(each.title), loc="left")
+            axes.set_ylabel(axis_words(each.label, scale, _HEIGHTS[1]))
+        entitle(axes, i, len(panels), each.title, figure.get_figwidth() / columns - 0.5)
     legend_above(figure)
     return figure
 
 
-def _line(axes: Axes, label: str, by_level: Mapping[str, Spot], scale: Scale, mark: Mark) -> None:
+def _line(
+    axes: Axes, label: str, by_level: Mapping[str, Spot], scale: Scale, mark: Mark, *, size: float
+) -> None:
     points = sorted((float(level), spot) for level, spot in by_level.items())
     x = np.array([place for place, _ in points])
-    value, low, high = (np.array(column) for column in zip(*(spot for _, spot in points), strict=True))
+    value, low, high = (np.array(column) for column in zip(*(spot[:3] for _, spot in points), strict=True))
     inside = np.clip(value, scale.low, scale.high)
-    look: Look = {"marker": mark.marker, "markersize": 3.4, "clip_on": False, "in_layout": False, **mark.look}
-    axes.plot(x, inside, label=label or None, linewidth=1.2, gid=label or "line", **look)
+    look: Look = {"linewidth": 1.2, "clip_on": False, "in_layout": False, **mark.look}
+    axes.plot(x, inside, gid=label or "line", **look)
+    axes.plot([], [], label=label or None, marker=mark.marker, markersize=3.6, **look)
     axes.fill_between(
         x,
         np.clip(low, scale.low, scale.high),
@@ -194,10 +195,8 @@ def _line(axes: Axes, label: str, by_level: Mapping[str, Spot], scale: Scale, ma
         alpha=0.16,
         linewidth=0,
     )
-    beyond = ~np.isfinite(value)
-    if beyond.any():
-        hollow: Look = {**look, "linestyle": "", "markerfacecolor": "white", "zorder": 3}
-        axes.plot(x[beyond], inside[beyond], **hollow)
+    for at, (_, spot) in zip(zip(x, inside, strict=True), points, strict=True):
+        _mark(axes, at, spot, mark, size)
 
 
 @styled
@@ -219,7 +218,7 @@ def improvement_matrix_figure(labels: Sequence[str], chances: Mapping[tuple[str,
     ['80', '20']
     """
     n = len(labels)
-    names = [cut(label) for label in labels]
+    names = list(cut_apart(labels).values())
     longest = max(map(len, names))
     turned = longest > _UPRIGHT
     width = ONE_COLUMN if n <= 5 and longest <= 2 * _UPRIGHT else TWO_COLUMNS
@@ -232,7 +231,7 @@ def improvement_matrix_figure(labels: Sequence[str], chances: Mapping[tuple[str,
     axes.pcolormesh(
         edges, edges, shares, cmap=_DIVERGING, vmin=0, vmax=100, edgecolors="white", linewidth=1.2
     )
-    for (row, column), (value, low, high) in chances.items():
+    for (row, column), (value, low, high, _) in chances.items():
         x, y = labels.index(column), labels.index(row)
         text = f"{value:.0f}\n{low:.0f}\N{EN DASH}{high:.0f}"
         axes.text(x, y, text, ha="center", va="center", fontsize=7, color="white" if value > 92 else INK)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
+from types import MappingProxyType
 from typing import Final
 
 from matplotlib.cm import ScalarMappable
@@ -12,9 +13,9 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from comparisons.figures_maze import MazePanel
-from comparisons.study.figures.saving import ONE_COLUMN, TWO_COLUMNS, cut, short
-from comparisons.style import INK, PALE, VERMILION, Look, grid_of, panel, styled
+from comparisons.study.figures.mazes import SMALLEST, maze_panels
+from comparisons.study.figures.scales import short
+from comparisons.style import INK, PALE, VERMILION, Look, styled
 from worlds import Cell, Layout
 
 _COLOURS: Final = {
@@ -41,9 +42,16 @@ class Heat:
 
 @styled
 def heat_figure(
-    layout: Layout, panels: Sequence[Heat], label: str, *, colours: str = "steps", ring: Sequence[Cell] = ()
+    layout: Layout,
+    panels: Sequence[Heat],
+    label: str,
+    *,
+    colours: str = "steps",
+    ring: Mapping[str, Cell] = MappingProxyType({}),
 ) -> Figure:
     """Draw numbers over a maze's cells, panels on one scale of colours; a cross is where none arrives.
+
+    Where cells are too small for numbers that can be read in print, their colours alone tell them.
 
     Parameters
     ----------
@@ -56,7 +64,7 @@ def heat_figure(
     colours
         "steps", or "gaps" for what is better the paler it is.
     ring
-        Cells to frame: the trigger and the goal that the numbers are for.
+        Cells to frame by their names: the trigger and the goal that the numbers are for.
 
     Examples
     --------
@@ -66,31 +74,22 @@ def heat_figure(
     >>> [text.get_text() for text in figure.axes[0].texts][:2]
     ['12', '0.25']
     """
-    rows, columns = grid_of(len(panels), 3 if layout.cols <= 12 else 2)
-    width = ONE_COLUMN if columns == 1 else TWO_COLUMNS
-    one = (width - 0.75) / columns
-    cell = one / (layout.cols + 0.8)  # inches
-    figure = Figure((width, rows * (cell * (layout.rows + 1) + 0.42)), layout="constrained")
+    figure, mazes = maze_panels(layout, [each.title for each in panels], ring, beside=0.55)
     finite = [value for each in panels for value in each.values.values() if isfinite(value)]
-    low, high = (0.0, max([*finite, 1e-9])) if min([*finite, 0.0]) >= 0 else (min(finite), max(finite))
-    scale, colour = Normalize(low, high), _COLOURS[colours]
-    for i, each in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        maze = MazePanel(axes, layout, 72 * cell)
-        maze.floor(doors_open=True)
+    low, high = min([*finite, 0.0]), max([*finite, 0.0])
+    scale, colour = Normalize(low, high if high > low else low + 1.0), _COLOURS[colours]
+    longest = max((len(_number(value)) for value in finite), default=1)
+    size = min(7.5, 0.42 * mazes[0].cell, 1.5 * mazes[0].cell / longest)
+    for each, maze in zip(panels, mazes, strict=True):
         for place, value in each.values.items():
             reached = isfinite(value)
             face = colour(scale(value)) if reached else PALE
             square = (place.col - 0.5, place.row - 0.5)
-            axes.add_patch(Rectangle(square, 1, 1, facecolor=face, edgecolor="white", linewidth=0.4))
-            look: Look = {"color": INK if reached else VERMILION, "fontsize": min(7.5, 0.3 * 72 * cell)}
+            maze.axes.add_patch(Rectangle(square, 1, 1, facecolor=face, edgecolor="white", linewidth=0.4))
+            look: Look = {"color": INK if reached else VERMILION, "fontsize": max(size, SMALLEST)}
             text = _number(value) if reached else "\N{MULTIPLICATION SIGN}"
-            axes.text(place.col, place.row, text, ha="center", va="center_baseline", **look)
-        for place in ring:
-            maze.ring(place, VERMILION)
-        axes.set_title(
-            panel(i, cut(each.title)) if len(panels) > 1 else cut(each.title), loc="left", fontsize=8
-        )
+            if not reached or size >= SMALLEST:
+                maze.axes.text(place.col, place.row, text, ha="center", va="center_baseline", **look)
     shown = figure.colorbar(ScalarMappable(scale, colour), ax=figure.axes, fraction=0.03, pad=0.02, aspect=28)
     shown.set_label(label, fontsize=8)
     shown.outline.set_visible(False)

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from comparisons.study.figures.saving import ONE_COLUMN, TWO_COLUMNS, cut, legend_above, marks
-from comparisons.style import GREY, grid_of, panel, styled
+from comparisons.study.figures.panels import ONE_COLUMN, TWO_COLUMNS, entitle, legend_above, marks
+from comparisons.style import GREY, grid_of, styled
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +56,11 @@ def reliability_figure(panels: Sequence[tuple[str, Mapping[str, Bins]]]) -> Figu
         axes.plot([0, 100], [0, 100], color=GREY, linewidth=0.8, linestyle=(0, (4, 2)), gid="diagonal")
         for label, bins in sets.items():
             x, y, look = 100 * bins.confidence, 100 * bins.accuracy, looks[label]
-            axes.plot(x, y, linewidth=1.2, label=label or None, **look.look)
-            area = 4 + 60 * bins.frames / max(int(bins.frames.sum()), 1)
+            axes.plot(x, y, linewidth=1.2, **look.look)
+            axes.plot(
+                [], [], linewidth=1.2, label=label or None, marker=look.marker, markersize=3.6, **look.look
+            )
+            area = 9 + 60 * bins.frames / max(int(bins.frames.sum()), 1)
             axes.scatter(x, y, s=area, color=look.colour, marker=look.marker, linewidth=0)
         axes.set_xlim(0, 103)
         axes.set_ylim(0, 103)
@@ -66,7 +69,6 @@ def reliability_figure(panels: Sequence[tuple[str, Mapping[str, Bins]]]) -> Figu
             axes.set_xlabel("confidence, %")
         if i % columns == 0:
             axes.set_ylabel("right, %")
-        if title:
-            axes.set_title(panel(i, cut(title)) if len(panels) > 1 else cut(title), loc="left")
+        entitle(axes, i, len(panels), title, side - 0.3)
     legend_above(figure)
     return figure

@@ -6,15 +6,16 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Final
 
 from matplotlib.figure import Figure
 
-from comparisons.figures_maze import MazePanel
-from comparisons.study.figures.saving import ONE_COLUMN, TWO_COLUMNS, cut
-from comparisons.style import BLUE, VERMILION, grid_of, panel, styled
+from comparisons.study.figures.mazes import maze_panels
+from comparisons.style import BLUE, styled
 from worlds import Cell, Layout
 
+_NO_BREAK: Final = "\N{NO-BREAK SPACE}"
 _WIDEST: Final = 0.2
 """Width of a line that every run takes, in cells."""
 
@@ -45,8 +46,10 @@ class Ways:
 
 
 @styled
-def ways_figure(layout: Layout, panels: Sequence[Ways], ring: Sequence[Cell] = ()) -> Figure:
-    """Draw how many runs make each step through a maze.
+def ways_figure(
+    layout: Layout, panels: Sequence[Ways], ring: Mapping[str, Cell] = MappingProxyType({})
+) -> Figure:
+    r"""Draw how many runs make each step through a maze.
 
     Parameters
     ----------
@@ -55,7 +58,7 @@ def ways_figure(layout: Layout, panels: Sequence[Ways], ring: Sequence[Cell] = (
     panels
         At least one.
     ring
-        Cells to frame: the trigger and the goal.
+        Cells to frame by their names: the trigger and the goal.
 
     Examples
     --------
@@ -63,29 +66,22 @@ def ways_figure(layout: Layout, panels: Sequence[Ways], ring: Sequence[Cell] = (
     >>> ways = Ways("maxq-0", [[Cell(0, 0), Cell(0, 1)], []])
     >>> figure = ways_figure(load_layout("two_rooms"), [ways])
     >>> figure.axes[0].get_title(loc="left")
-    'maxq-0: 1 of 2 runs'
+    'maxq-0: 1\xa0of\xa02\xa0runs'
     """
-    rows, columns = grid_of(len(panels), 3 if layout.cols <= 12 else 2)
-    width = ONE_COLUMN if columns == 1 else TWO_COLUMNS
-    cell = (width - 0.2) / columns / (layout.cols + 0.8)  # inches
-    figure = Figure((width, rows * (cell * (layout.rows + 1) + 0.42)), layout="constrained")
-    for i, ways in enumerate(panels):
-        axes = figure.add_subplot(rows, columns, i + 1)
-        maze = MazePanel(axes, layout, 72 * cell)
-        maze.floor(doors_open=True)
+    runs = [f"{ways.arrived} of {len(ways.ways)} runs".replace(" ", _NO_BREAK) for ways in panels]
+    titles = [
+        f"{ways.title}: {told}" if ways.title else told for ways, told in zip(panels, runs, strict=True)
+    ]
+    figure, mazes = maze_panels(layout, titles, ring)
+    for ways, maze in zip(panels, mazes, strict=True):
         for (here, there), share in ways.shares().items():
-            axes.plot(
+            maze.axes.plot(
                 (here.col, there.col),
                 (here.row, there.row),
                 color=BLUE,
-                linewidth=max(0.4, _WIDEST * 72 * cell * share),
+                linewidth=max(0.4, _WIDEST * maze.cell * share),
                 solid_capstyle="round",
                 zorder=3,
             )
         maze.robot(layout.start)
-        for place in ring:
-            maze.ring(place, VERMILION)
-        runs = f"{ways.arrived} of {len(ways.ways)} runs"
-        title = f"{cut(ways.title)}: {runs}" if ways.title else runs
-        axes.set_title(panel(i, title) if len(panels) > 1 else title, loc="left", fontsize=8)
     return figure

@@ -13,7 +13,7 @@ from worlds import UserError, suggest
 
 MOST_COLOURS: Final = 6
 """More are not told apart at a glance."""
-MOST_PANELS: Final = 6
+MOST_PANELS: Final = 12
 NUMERIC_LEVELS: Final = 4
 """A factor with so many numbers for levels is an abscissa; fewer are read better as rows."""
 _LITTLE: Final = ("true", "false", "yes", "no", "on", "off", "none", "all", "declared", "full")

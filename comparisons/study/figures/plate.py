@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite, isnan, nan
 from typing import Final
@@ -13,15 +13,15 @@ from matplotlib.figure import Figure
 
 from comparisons.study.figures.draw_estimates import Estimates
 from comparisons.study.figures.grouping import About, Sides, axis_of, title_of
-from comparisons.study.figures.saving import Spot
+from comparisons.study.figures.scales import Spot
 from comparisons.study.kinds import Measure
 from comparisons.study.results.rows import Row, by_levels
-from comparisons.study.results.samples import samples_of
+from comparisons.study.results.samples import FEWEST_SEEDS, samples_of
 from comparisons.study.results.statistics import Estimate, estimate, improvement
 from comparisons.study.results.tables import Table
 from comparisons.study.results.wording import NEVER, counted, plain
 
-Number = str | float
+Number = str | int | float
 Header = tuple[str, ...]
 Numbers = tuple[tuple[Number, ...], ...]
 _SHOWN: Final = 150  # rows of a figure's numbers on the page
@@ -52,7 +52,7 @@ class Plate:
 
 
 def numbers_table(plate: Plate) -> Table:
-    """Return a figure's data for people; a long one is cut off, for its file has it all.
+    """Return a figure's data for people; of much there are some rows, evenly spread: its file has all.
 
     Examples
     --------
@@ -60,18 +60,26 @@ def numbers_table(plate: Plate) -> Table:
     >>> numbers_table(Plate("steps", Figure(), "", ("level", "steps"), numbers)).rows
     (('1', '1,234'), ('0.9', 'never'))
     """
-    rows = tuple(tuple(map(_cell, row)) for row in plate.numbers[:_SHOWN])
+    count = len(plate.numbers)
+    few = (
+        sorted({round(i * (count - 1) / (_SHOWN - 1)) for i in range(_SHOWN)})
+        if count > _SHOWN
+        else range(count)
+    )
+    rows = tuple(tuple(map(_cell, plate.numbers[i])) for i in few)
     first = plate.numbers[0] if plate.numbers else plate.header
     labels = next((i for i, value in enumerate(first) if not isinstance(value, str)), len(first))
     note = ""
-    if len(plate.numbers) > _SHOWN:
-        note = f"The first {_SHOWN} of {len(plate.numbers):,} rows; all are in figures/{plate.name}.csv."
+    if count > _SHOWN:
+        note = f"{_SHOWN} of {count:,} rows, evenly spread; all are in figures/{plate.name}.csv."
     return Table(plate.header, rows, f"The numbers of figure {plate.name}.", note, labels)
 
 
 def _cell(value: Number) -> str:
     if isinstance(value, str):
         return value
+    if isinstance(value, int):
+        return f"{value:,}"
     if isfinite(value):
         return plain(value)
     return _NOTHING if isnan(value) else NEVER
@@ -103,7 +111,7 @@ def spot_of(measure: Measure, runs: Sequence[Row], statistic: str) -> Spot | Non
     >>> steps = Measure("steps", "steps to the goal", "steps", "less")
     >>> runs = [Row({}, seed, "", Result({"steps": 9.0 + seed % 2})) for seed in range(10)]
     >>> spot_of(steps, runs, "iqm").value, spot_of(steps, runs[:1], "iqm")
-    (9.5, Spot(value=9.0, low=nan, high=nan))
+    (9.5, Spot(value=9.0, low=nan, high=nan, seeds=1))
     """
     return _spot(estimate(samples_of(runs, measure), statistic), 1.0 if measure.unit else 100.0)
 
@@ -117,8 +125,8 @@ def _spot(found: Estimate | None, times: float) -> Spot | None:
     if found is None:
         return None
     if not found.bounded:
-        return Spot(times * found.value, nan, nan)
-    return Spot(times * found.value, times * found.low, times * found.high)
+        return Spot(times * found.value, nan, nan, found.seeds)
+    return Spot(times * found.value, times * found.low, times * found.high, found.seeds)
 
 
 def estimates_of(
@@ -147,7 +155,7 @@ def told(about: About, sides: Sides, panels: Sequence[Estimates]) -> tuple[Heade
     ]
     statistic = about.statistic.upper() if about.statistic == "iqm" else about.statistic
     sides_named = (", ".join(sides.colours) or "line", ", ".join(sides.rows) or "runs")
-    header = ("panel", "measure", *sides_named, statistic, "95 % from", "to")
+    header = ("panel", "measure", *sides_named, statistic, "95 % from", "to", "seeds")
     return without_blanks(header, rows)
 
 
@@ -156,14 +164,14 @@ def without_blanks(header: Header, rows: Sequence[tuple[Number, ...]]) -> tuple[
 
     Examples
     --------
-    >>> without_blanks(("panel", "line", "steps"), [("", "a", 3.0), ("", "b", 4.0)])
-    (('line', 'steps'), (('a', 3.0), ('b', 4.0)))
+    >>> without_blanks(("panel", "line", "steps", "from"), [("", "a", 3.0, 3.0), ("", "b", 4.0, 4.0)])
+    (('line', 'steps', 'from'), (('a', 3.0, 3.0), ('b', 4.0, 4.0)))
     """
     kept = [
         i
         for i in range(len(header))
-        if any(row[i] != "" for row in rows)
-        and not (i + 1 < len(header) and all(row[i] == row[i + 1] for row in rows))
+        if any(not isinstance(row[i], str) for row in rows)
+        or not all(row[i] in ("", *row[i + 1 : i + 2]) for row in rows)
     ]
     return tuple(header[i] for i in kept), tuple(tuple(row[i] for i in kept) for row in rows)
 
@@ -173,6 +181,21 @@ def seeds_of(rows: Sequence[Row], about: About) -> str:
     counts = {len(runs) for runs in by_levels(rows, list(about.factors)).values()}
     low, high = min(counts), max(counts)
     return counted(high, "seed") if low == high else f"{low} to {counted(high, 'seed')}"
+
+
+def few_words(spots: Iterable[Spot]) -> str:
+    """Return the sentences that a caption needs where marks rest on few seeds.
+
+    Examples
+    --------
+    >>> few_words([Spot(1, nan, nan, 1), Spot(2, 1, 3, 20)])
+    ' Small marks rest on fewer than 5 seeds; one seed has no interval.'
+    >>> few_words([Spot(2, 1, 3, 20)])
+    ''
+    """
+    few = {spot.seeds for spot in spots if spot.few}
+    one = "; one seed has no interval" * (1 in few)
+    return f" Small marks rest on fewer than {FEWEST_SEEDS} seeds{one}." if few else ""
 
 
 def abouts(measures: Sequence[Measure]) -> str:

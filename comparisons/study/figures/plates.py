@@ -33,11 +33,12 @@ from comparisons.study.figures.plate import (
     capital,
     chance_of,
     estimates_of,
+    few_words,
     seeds_of,
     told,
     without_blanks,
 )
-from comparisons.study.figures.saving import Spot
+from comparisons.study.figures.scales import Spot
 from comparisons.study.results.rows import Row
 from comparisons.study.results.samples import FEWEST_SEEDS
 
@@ -58,9 +59,10 @@ def estimates_plate(about: About, rows: Sequence[Row]) -> Plate | None:
         return None
     caption = (
         f"{capital(about.statistic_in_words)} over {seeds_of(rows, about)} (mark) and its 95 % interval "
-        f"(line). {capital(abouts(measures))}."
+        f"(line). {capital(abouts(measures))}.{_few(panels)}"
     )
-    return Plate("estimates", estimates_figure(panels), caption, *told(about, sides, panels))
+    figure = estimates_figure(panels, _beside(sides))
+    return Plate("estimates", figure, caption, *told(about, sides, panels))
 
 
 def over_plate(about: About, rows: Sequence[Row]) -> Plate | None:
@@ -81,7 +83,7 @@ def over_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     name = sides.rows[0]
     caption = (
         f"Over {name}: {about.statistic_in_words} over {seeds_of(rows, about)} (line) and its 95 % interval "
-        f"(band). {capital(abouts(measures))}."
+        f"(band). {capital(abouts(measures))}.{_few(panels)}"
     )
     return Plate("over", over_figure(panels, name), caption, *told(about, sides, panels))
 
@@ -92,7 +94,7 @@ def parts_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     over = numeric_sides(about)
     sides = over if over is not None and not over.panels else estimate_sides(about)
     too_many = sides is not over and about.combinations(sides.rows) > _MOST_ROWS
-    if not names or len(names) > 2 * MOST_PANELS or not sides.rows or too_many:
+    if not names or len(names) > MOST_PANELS or not sides.rows or too_many:
         return None
     found = grouped(rows, about, sides)[""]
     panels = [estimates_of(about.kind.measure(name), found, about.statistic) for name in names]
@@ -103,10 +105,11 @@ def parts_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     ]
     if not panels:
         return None
-    figure = over_figure(panels, sides.rows[0]) if sides is over else estimates_figure(panels)
+    figure = over_figure(panels, sides.rows[0]) if sides is over else estimates_figure(panels, _beside(sides))
     caption = (
         f"{capital(about.measure.about)}, part by part: {about.statistic_in_words} over "
         f"{seeds_of(rows, about)} and its 95 % interval. Runs in which a part never came up are not in it."
+        f"{_few(panels)}"
     )
     return Plate("parts", figure, caption, *told(about, sides, panels))
 
@@ -139,7 +142,7 @@ def _matrix_plate(about: About, rows: Sequence[Row], by_level: Mapping[str, Sequ
         f"its 95 % interval; a tie counts as half. {_better(about)}; {seeds_of(rows, about)}."
     )
     numbers = tuple((one, other, *spot) for (one, other), spot in chances.items())
-    header = ("this", "is better than", "%", "95 % from", "to")
+    header = ("this", "is better than", "%", "95 % from", "to", "seeds")
     figure = improvement_matrix_figure(list(by_level), chances)
     return Plate("improvement", figure, caption, header, numbers)
 
@@ -164,7 +167,7 @@ def _against_plate(
     if len(spots) > MOST_COLOURS and not over:
         return None
     baseline = named({compare: against}, [compare], about.factors)
-    label = f"better than {baseline}, %"
+    label = f"chance to beat {baseline}, %"
     if over:
         number = {colour: found[colour][against][0].levels[about.others[0]] for colour in spots}
         turned = {
@@ -173,14 +176,23 @@ def _against_plate(
         }
         figure = over_figure([Estimates(label, turned, True)], about.others[0], 50.0)
     else:
-        figure = estimates_figure([Estimates(label, spots, True)], 50.0)
+        figure = estimates_figure([Estimates(label, spots, True)], compare, 50.0)
     caption = (
         f"Probability that a run is better than one with {baseline}, and its 95 % interval; a tie counts as "
         f"half, so that 50 % (dashed) is no difference. {_better(about)}; {seeds_of(rows, about)}."
     )
-    header = (", ".join(about.others) or "line", compare, "% of pairs", "95 % from", "to")
+    header = (", ".join(about.others) or "line", compare, "% of pairs", "95 % from", "to", "seeds")
     numbers = [(colour, level, *spot) for colour, by in spots.items() for level, spot in by.items()]
     return Plate("improvement", figure, caption, *without_blanks(header, numbers))
+
+
+def _beside(sides: Sides) -> str:
+    """Return what stands beside rows: the name of their factor, unless labels of several hold theirs."""
+    return sides.rows[0] if len(sides.rows) == 1 else ""
+
+
+def _few(panels: Sequence[Estimates]) -> str:
+    return few_words(spot for each in panels for spot in each.all)
 
 
 def _better(about: About) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, isfinite
 from typing import Final
 
 import numpy as np
@@ -13,16 +13,14 @@ from comparisons.study.figures.curves import iqm_bands, step_aligned
 from comparisons.study.figures.draw_curves import Curve, Curves, convergence_figure, profiles_figure
 from comparisons.study.figures.grouping import About, Sides, axis_of, curve_sides, grouped
 from comparisons.study.figures.plate import Number, Plate, capital, seeds_of, without_blanks
-from comparisons.study.figures.saving import WIDE_RANGE
+from comparisons.study.figures.scales import WIDE_RANGE
 from comparisons.study.kinds import Measure
-from comparisons.study.results.rows import Row
+from comparisons.study.results.rows import Row, by_levels
 from comparisons.study.results.samples import samples_of
 from comparisons.study.results.statistics import Profile, profile
 
 _LEARNING: Final = "learning"
 _SHARE: Final = "share_optimal"
-_ENDING: Final = "share_ending"
-_POINTS: Final = 21  # rows of a curve's numbers
 
 
 def is_effort(measure: Measure) -> bool:
@@ -39,14 +37,14 @@ def is_effort(measure: Measure) -> bool:
 
 
 def learning_plate(about: About, rows: Sequence[Row]) -> Plate | None:
-    """Return the share of optimal starts while learning, with bands; None if the runs keep no such curve."""
+    """Return the share of optimal starts while learning, with bands; None if no run keeps one that moves."""
     return _learning_plate(_LEARNING, about, rows, _SHARE)
 
 
 def returns_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     """Return the mean return while learning, with bands; None if the runs keep no such curve.
 
-    It counts from where every start ends: before, it is the mean of others every time.
+    A run tells none while an episode may never end.
     """
     return _learning_plate("returns", about, rows, "mean_return")
 
@@ -66,42 +64,49 @@ def _learning_plate(name: str, about: About, rows: Sequence[Row], column: str) -
     share = column == _SHARE
     axis = column.replace("_", " ") + ", %" * share
     panels, numbers = [], list[tuple[Number, ...]]()
+    alike = about.compare in sides.panels  # what is compared stands on the same axes
     for title, by_colour in grouped(rows, about, sides).items():
         shown = [row for by_row in by_colour.values() for part in by_row.values() for row in part]
-        end = max(x for row in shown for x in curves_of[row.hash][abscissa] if x is not None)
+        end = max(
+            x for row in (rows if alike else shown) for x in curves_of[row.hash][abscissa] if x is not None
+        )
         curves = {}
         for label, by_row in by_colour.items():
             runs = [row for part in by_row.values() for row in part]
-            curve = _band(runs, abscissa, column, 100.0 if share else 1.0, end)
+            curve = _band([_points(row, abscissa, column) for row in runs], share, end)
             curves[label] = curve
-            few = np.unique(np.linspace(0, len(curve.x) - 1, _POINTS).round().astype(int))
-            points = np.stack([curve.x, curve.value, curve.low, curve.high])[:, few].T.tolist()
-            numbers += [(title, label, len(runs), *point) for point in points]
+            drawn = np.isfinite(curve.value)
+            points = np.stack([curve.x, curve.value, curve.low, curve.high])[:, drawn].T.tolist()
+            numbers += [(title, label, *point, len(runs)) for point in points]
         panels.append(Curves(title, axis, curves, share))
+    if len({point[3] for point in numbers}) < 2:
+        return None  # all that would be seen is one line from end to end
     caption = (
         f"{capital(column.replace('_', ' '))} while learning: interquartile mean over "
         f"{seeds_of(rows, about)} (line) and its 95 % bootstrap band, whole runs resampled. A run that "
         "ended keeps its last value"
     )
-    caption += "." if share else "; a line begins where the middle half of its runs end from every start."
-    header = ("panel", "line", "runs", abscissa, axis, "95 % from", "to")
-    figure = convergence_figure(panels, {"steps": "environment steps"}.get(abscissa, abscissa))
+    begins = "; a line begins where the middle half of its runs end from every start"
+    silent = any(None in curves_of[row.hash][column] for row in rows)
+    caption += f"{begins * silent}."
+    caption += " Each panel has axes of its own." * (len(panels) > 1 and not alike)
+    header = ("panel", "line", abscissa, axis, "95 % from", "to", "seeds")
+    figure = convergence_figure(panels, {"steps": "environment steps"}.get(abscissa, abscissa), alike=alike)
     return Plate(name, figure, caption, *without_blanks(header, numbers))
 
 
-def _band(rows: Sequence[Row], abscissa: str, column: str, times: float, end: float) -> Curve:
-    """Return the interquartile mean of some runs' curves; a value that a run does not tell is the worst."""
-    runs = []
-    for row in rows:
-        table = row.result.curves[_LEARNING]
-        whole = [True] * len(table[column])
-        if column == "mean_return" and _ENDING in table:
-            whole = [share == 1 for share in table[_ENDING]]
-        three = zip(table[abscissa], table[column], whole, strict=True)
-        points = [(x, -inf if y is None or not all_ else times * y) for x, y, all_ in three if x is not None]
-        runs.append(([x for x, _ in points], [y for _, y in points]))
+def _points(row: Row, abscissa: str, column: str) -> tuple[list[float], list[float]]:
+    """Return a run's curve, the worst where it does not tell."""
+    table = row.result.curves[_LEARNING]
+    pairs = zip(table[abscissa], table[column], strict=True)
+    points = [(x, -inf if y is None else y) for x, y in pairs if x is not None]
+    return [x for x, _ in points], [y for _, y in points]
+
+
+def _band(runs: Sequence[tuple[list[float], list[float]]], share: bool, end: float) -> Curve:
+    """Return the interquartile mean of some runs' curves, and its band; shares in per cent."""
     places, values = step_aligned(runs, end)
-    return Curve(places, *iqm_bands(values))
+    return Curve(places, *(iqm_bands(values) * (100.0 if share else 1.0)))
 
 
 def efficiency_plate(about: About, rows: Sequence[Row]) -> Plate | None:
@@ -126,19 +131,23 @@ def _profile_plate(name: str, about: About, rows: Sequence[Row], measure: Measur
     sides = curve_sides(about)
     everything = _values(rows, measure)
     finite = everything[np.isfinite(everything)]
-    if sides is None or len(set(finite.tolist())) < 2:
+    if sides is None or not _vary(rows, about, measure):
         return None
     low, high = float(finite.min()), float(finite.max())
     log = measure.better == "less" and low > 0 and high > WIDE_RANGE * low
-    ends = (low / 1.2, high * 1.1) if log else (low - 0.04 * (high - low), high + 0.04 * (high - low))
+    room = 0.04 * ((high - low) or abs(high) or 1.0)
+    ends = (low / 1.2, high * 1.1) if log else (low - room, high + room)
     panels, numbers = _profile_panels(about, rows, sides, measure, ends)
     less = measure.better == "less"
     what = f"with at most so many {measure.unit}" if less else "with at least so much"
-    caption = f"Share of runs {what}: {measure.about}. Band: Wilson's 95 % interval; {seeds_of(rows, about)}."
+    caption = (
+        f"Share of runs {what}: {measure.about}. Band, where some are and some are not: Wilson's 95 % "
+        f"interval; {seeds_of(rows, about)}."
+    )
     if less and len(finite) < len(everything):
         caption += " Runs that never came there never count, so that a line need not reach 100 %."
     axis = axis_of(measure)
-    header = ("panel", "line", "runs", axis, "share of runs, %", "95 % from", "to")
+    header = ("panel", "line", axis, "share of runs, %", "95 % from", "to", "seeds")
     figure = profiles_figure(panels, axis, less=less, log=log)
     return Plate(name, figure, caption, *without_blanks(header, numbers))
 
@@ -157,9 +166,9 @@ def _profile_panels(
             own = profile(samples, [*{v for v in samples.values.tolist() if abs(v) < inf}, *ends])
             curves[label] = _steps(own, times)
             points = list(zip(*(getattr(curves[label], part) for part in _PARTS), strict=True))
-            numbers += [(title, label, samples.runs, *map(float, point)) for point in points[1:-1]]
+            numbers += [(title, label, *map(float, point), samples.runs) for point in points[1:-1]]
         if curves:
-            panels.append(Curves(title, "runs, %", curves, True))
+            panels.append(Curves(title, "share of runs, %", curves, True))
     return panels, numbers
 
 
@@ -168,6 +177,13 @@ _PARTS: Final = ("x", "value", "low", "high")
 
 def _steps(found: Profile, times: float) -> Curve:
     return Curve(times * found.thresholds, 100 * found.shares, 100 * found.low, 100 * found.high)
+
+
+def _vary(rows: Sequence[Row], about: About, measure: Measure) -> bool:
+    """Return whether runs of any combination differ: else its share jumps once, and estimates say as much."""
+    combinations = by_levels(rows, list(about.factors)).values()
+    found = [set(_values(runs, measure).tolist()) for runs in combinations]
+    return any(len(values) > 1 for values in found) and any(map(isfinite, set().union(*found)))
 
 
 def _values(rows: Sequence[Row], measure: Measure) -> NDArray[np.float64]:

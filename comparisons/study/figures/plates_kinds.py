@@ -13,9 +13,9 @@ from comparisons.study.figures.draw_heat import Heat, heat_figure
 from comparisons.study.figures.draw_reliability import Bins, reliability_figure
 from comparisons.study.figures.draw_ways import Ways, ways_figure
 from comparisons.study.figures.grouping import MOST_PANELS, About, Sides, curve_sides, grouped
-from comparisons.study.figures.plate import Number, Plate, seeds_of, without_blanks
+from comparisons.study.figures.plate import Number, Plate, capital, seeds_of, without_blanks
 from comparisons.study.results.rows import Row
-from comparisons.study.results.statistics import aggregate
+from comparisons.study.results.statistics import Statistic, aggregate
 from comparisons.study.runs.judging import smallest
 from worlds import Cell, Layout, parse_layout
 
@@ -35,18 +35,26 @@ def gaps_map_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     return _map_plate("gaps_map", "gaps", what, about, rows)
 
 
+_SUMMED: Final[Mapping[str, Statistic]] = {"steps": "median", "gaps": "mean"}
+"""What sums up the runs' maps: a few runs' losses must show, and do not in a median."""
+_CROSSES: Final = {"steps": "where half of the runs or more do", "gaps": "where a run or more does"}
+
+
 def ways_plate(about: About, rows: Sequence[Row]) -> Plate | None:
     """Return the ways that learnt policies take in the layout's own example; None if runs keep none."""
     kept = _maps(about, rows)
     if kept is None or len(kept.panels) > MOST_PANELS:
         return None
+    start = str(kept.layout.start)
+    told = {title: [one for one in maps if _has_way(one, start)] for title, maps in kept.panels.items()}
     panels = {
         title: Ways(title, [[_cell(cell) for cell in one["way"]] for one in maps])
-        for title, maps in kept.panels.items()
+        for title, maps in told.items()
+        if maps
     }
     if not any(ways.arrived for ways in panels.values()):
         return None
-    figure = ways_figure(kept.layout, list(panels.values()), [kept.layout.marks[m] for m in kept.marks])
+    figure = ways_figure(kept.layout, list(panels.values()), _ring(kept))
     caption = (
         f"Ways of the learnt policies of {seeds_of(rows, about)} from the start to trigger {kept.marks[0]} "
         f"and goal {kept.marks[1]} (framed): the wider a line, the more runs go there."
@@ -57,6 +65,12 @@ def ways_plate(about: About, rows: Sequence[Row]) -> Plate | None:
         for (here, there), share in ways.shares().items()
     ]
     return Plate("ways", figure, caption, *without_blanks(("panel", "from", "to", "runs, %"), numbers))
+
+
+def _has_way(one: Mapping[str, Any], start: str) -> bool:
+    """Return whether a run's map tells its way; that of the optimum, or of a world with chance, does not."""
+    steps = dict(zip(one["cells"], one["steps"], strict=True))
+    return bool(one["way"]) or steps.get(start) is None
 
 
 class _Maps(NamedTuple):
@@ -87,30 +101,35 @@ def _map_plate(name: str, column: str, what: str, about: About, rows: Sequence[R
     kept = _maps(about, rows)
     if kept is None:
         return None
-    panels = {title: _middle(maps, column) for title, maps in kept.panels.items()}
+    statistic = _SUMMED[column]
+    panels = {title: _summed(maps, column, statistic) for title, maps in kept.panels.items()}
     alike = len({tuple(values) for values in panels.values()}) == 1
     if alike:
         panels = {"every combination": next(iter(panels.values()))} if len(panels) > 1 else panels
     if len(panels) > MOST_PANELS or (column == "gaps" and not any(any(values) for values in panels.values())):
         return None
-    layout, (trigger, goal) = kept.layout, kept.marks
-    ring = [layout.marks[mark] for mark in kept.marks]
+    trigger, goal = kept.marks
     at = [_cell(cell) for cell in kept.cells]
     heats = [Heat(title, dict(zip(at, values, strict=True))) for title, values in panels.items()]
-    label = {"steps": "steps (median)", "gaps": "return lost (median)"}[column]
-    figure = heat_figure(layout, heats, label, colours=column, ring=ring)
+    label = {"steps": "steps", "gaps": "return lost"}[column] + f" ({statistic})"
+    figure = heat_figure(kept.layout, heats, label, colours=column, ring=_ring(kept))
     caption = (
-        f"Median over {seeds_of(rows, about)} of the {what}, with trigger {trigger} and goal {goal} "
-        "(framed). A cross is where half of the runs or more do not come to the end."
+        f"{capital(statistic)} over {seeds_of(rows, about)} of the {what}, with trigger {trigger} and goal "
+        f"{goal} (framed). A cross is {_CROSSES[column]} not come to the end."
     )
     numbers = [(each.title, str(cell), value) for each in heats for cell, value in each.values.items()]
     return Plate(name, figure, caption, *without_blanks(("panel", "cell", label), numbers))
 
 
-def _middle(maps: Sequence[Mapping[str, Any]], column: str) -> list[float]:
-    """Return each cell's median over runs; where a run does not come to the end it is infinite."""
+def _ring(kept: _Maps) -> dict[str, Cell]:
+    """Return the trigger and the goal of the maps by their names."""
+    return {mark: kept.layout.marks[mark] for mark in kept.marks}
+
+
+def _summed(maps: Sequence[Mapping[str, Any]], column: str, statistic: Statistic) -> list[float]:
+    """Return a statistic over runs for each cell; where a run does not come to the end it is infinite."""
     values = np.array([[inf if v is None else float(v) for v in one[column]] for one in maps])
-    return [float(value) for value in aggregate(values.T, "median")]
+    return [float(value) for value in aggregate(values.T, statistic)]
 
 
 def _cell(text: str) -> Cell:
@@ -147,16 +166,15 @@ def reliability_plate(about: About, rows: Sequence[Row]) -> Plate | None:
         for label, by_row in by_colour.items():
             sets[label] = bins = _pooled([row for runs in by_row.values() for row in runs])
             three = zip(bins.confidence, bins.accuracy, bins.frames, strict=True)
-            numbers += [(title, label, 100 * float(c), 100 * float(a), float(n)) for c, a, n in three]
+            numbers += [(title, label, 100 * float(c), 100 * float(a), int(n)) for c, a, n in three]
         panels.append((title, sets))
+    pooled = [name for name in about.others if name not in (*sides.colours, *sides.panels)]
+    also = f", and of all levels of {' and '.join(pooled)}," if pooled else ""
     caption = (
         "How often the label is right by how sure of it the backend is, in bins; the frames of "
-        f"{seeds_of(rows, about)} are taken together, and dots grow with their number. On the dashed line "
-        "confidence means what it says."
+        f"{seeds_of(rows, about)}{also} are taken "
+        "together, and marks grow with their number. On the dashed line confidence means what it says."
     )
-    pooled = [name for name in about.others if name not in (*sides.colours, *sides.panels)]
-    if pooled:
-        caption += f" So are those of all levels of {' and '.join(pooled)}."
     header = ("panel", "line", "confidence, %", "right, %", "frames")
     figure = reliability_figure(panels)
     return Plate("reliability", figure, caption, *without_blanks(header, numbers))

@@ -1,12 +1,15 @@
 """Reports of studies: what they say, in which order, and that nothing in a study becomes markup."""
 
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Mapping
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
+from html_reader import Reader
 
 from comparisons.study.declaring.declaration import Planned, Study, parse_study
 from comparisons.study.kinds import Result
@@ -29,44 +32,6 @@ vary:
     "<img src=x onerror=alert(1)>": {{gamma: 0.9}}
 answer: {{measure: steps_to_optimal, compare: discount, against: 1}}
 """
-VOID = {"meta", "link", "img", "input", "br"}
-
-
-class Reader(HTMLParser):
-    """Collects a page's tags and links, and checks the nesting."""
-
-    def __init__(self, page: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.tags: list[str] = []
-        self.links: list[str] = []
-        self.ids: list[str] = []
-        self.texts: list[str] = []
-        self.feed(page)
-        self.close()
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Note the element."""
-        self.tags.append(tag)
-        self.ids += [value for name, value in attrs if name == "id" and value]
-        self.links += [value for name, value in attrs if name in {"href", "xlink:href", "src"} and value]
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        """Treat ``<a/>`` as ``<a></a>``."""
-        self.handle_starttag(tag, attrs)
-        if tag not in VOID:
-            self.handle_endtag(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        """Check that the innermost element is the one that ends."""
-        assert self.open.pop() == tag, f"</{tag}> closes another element"
-
-    def handle_data(self, data: str) -> None:
-        """Keep texts that a reader sees."""
-        if self.open and self.open[-1] not in {"script", "style"} and data.strip():
-            self.texts.append(" ".join(data.split()))
 
 
 def provenance(**other: Any) -> Mapping[str, Any]:
@@ -150,7 +115,9 @@ def test_every_figure_lies_beside_the_page_with_its_numbers(made: Path, page: st
         assert f'id="figure-{name}"' in page
     assert page.count("<figcaption>") == len(names)
     assert page.count("<code>affordant study report gamma</code>") == len(names)
-    assert (folder / "estimates.csv").read_text().splitlines()[1].split(",")[-3].startswith("1002.5")
+    assert (folder / "estimates.csv").read_text().splitlines()[1].split(",")[-4:] == [
+        *("1002.5", "1000.25", "1004.75", "6"),
+    ]
 
 
 def test_tables_are_there_for_a_paper(made: Path, page: str) -> None:
@@ -269,3 +236,54 @@ def test_a_study_without_answer_shows_its_table(tmp_path: Path) -> None:
     assert [each.name for each in sorted((path.parent / "tables").iterdir())] == ["results.md", "results.tex"]
     assert {each.stem for each in (path.parent / "figures").iterdir()} == {"estimates"}
     assert "asks for figures that these runs have nothing for: reliability" in told
+
+
+def test_unfinished_combinations_are_listed_alone(tmp_path: Path) -> None:
+    """Only combinations that lack results are listed as such, with what became of their runs."""
+    study, store = begun(tmp_path)
+    planned = study.expand()
+    for run in planned:
+        if run.levels["discount"] == "1" or run.spec.seed < 4:
+            store.save(ran(run))
+    path, _ = report_study(store.directory)
+    texts = Reader(path.read_text()).texts
+    at = texts.index("Table 2. Combinations of which not every run has a result.")
+    heads = texts[at + 1 : at + 6]
+    assert heads == ["discount", "done", "failed", "damaged", "to do"]
+    assert texts[at + 6 : at + 11] == ["<img src=x onerror=alert(1)>", "4", "0", "0", "2"]
+
+
+def test_a_letter_that_figures_lack_is_told_once(tmp_path: Path) -> None:
+    """Labels may hold any letters: what the figures' font has not is named, and nothing else is said."""
+    study, store = begun(tmp_path, TEXT.replace("<img src=x onerror=alert(1)>", "\u5b66 \u03b3"))
+    for run in study.expand():
+        store.save(ran(run))
+    path, _ = report_study(store.directory)
+    told = " ".join(Reader(path.read_text()).texts)
+    assert "boxes where labels hold letters that their font has not: \u5b66." in told
+
+
+def test_the_command_names_the_folder(made: Path, page: str, tmp_path: Path) -> None:
+    """However the store is written, the command has its name, and the page tells where to paste it."""
+    report_study(made / "runs" / "..", tmp_path / "other")
+    assert (tmp_path / "other" / PAGE).read_text() == page
+    assert "in the folder that holds gamma." in " ".join(Reader(page).texts)
+
+
+@pytest.mark.slow
+def test_neither_place_nor_settings_of_the_user_show(made: Path, tmp_path: Path) -> None:
+    """Another time zone, another locale and other settings of matplotlib give the same bytes."""
+    (tmp_path / "matplotlibrc").write_text("lines.linewidth: 9\nfont.size: 30\naxes.facecolor: black\n")
+    strange = {
+        "MATPLOTLIBRC": str(tmp_path),
+        "TZ": "Pacific/Kiritimati",
+        "LC_ALL": "C",
+        "PYTHONHASHSEED": "7",
+    }
+    out = tmp_path / "out"
+    code = "import sys; from comparisons.cli import main; sys.argv[0] = 'affordant'; main()"
+    command = [sys.executable, "-c", code, "study", "report", str(made), "--out", str(out)]
+    subprocess.run(command, check=True, env={**os.environ, **strange}, capture_output=True)  # noqa: S603
+    report_study(made)
+    for path in (made / "report").rglob("*.*"):
+        assert path.read_bytes() == (out / path.relative_to(made / "report")).read_bytes(), path.name
