@@ -60,18 +60,17 @@ class Watch:
                 self.sizes.append(megabytes())
 
 
-def timed(engine: Engine, runs: int, settings: str) -> tuple[Watch, Summary, Path]:
+def timed(engine: Engine, runs: int, settings: str, out: Path) -> tuple[Watch, Summary]:
     """Run a study of the tests' kind; the watch is set as it begins."""
     text = f"study: bench\nquestion: How long?\nkind: for-tests\nseeds: {runs}\nsettings: {settings}\n"
-    out = Path(tempfile.mkdtemp(), "out")
     watch = Watch()
     summary = run_study(parse_study(text), out, engine, track=watch)
-    return watch, summary, out
+    return watch, summary
 
 
-def short_runs(name: str, workers: int, engine: Engine, runs: int) -> None:
+def short_runs(name: str, workers: int, engine: Engine, runs: int, out: Path) -> None:
     """Tell what a run costs beyond itself, where there is next to nothing to do in it."""
-    watch, summary, out = timed(engine, runs, "{n: 20}")
+    watch, summary = timed(engine, runs, "{n: 20}", out)
     assert summary.done == runs
     seconds = watch.last - watch.first  # the workers' start left out
     cost = 1e3 * (seconds - watch.own / workers) / (runs - 1)
@@ -89,9 +88,9 @@ def short_runs(name: str, workers: int, engine: Engine, runs: int) -> None:
         print(f"  all files checked in {told[0]:.1f} s; the index read in {told[1]:.2f} s")
 
 
-def long_runs(engine: Engine, runs: int) -> float:
+def long_runs(engine: Engine, runs: int, out: Path) -> float:
     """Return the seconds that runs take which keep a core busy, the workers' start included."""
-    watch, summary, _ = timed(engine, runs, "{task: burn, n: 6000000}")
+    watch, summary = timed(engine, runs, "{task: burn, n: 6000000}", out)
     assert summary.done == runs
     return watch.last - watch.begun
 
@@ -104,16 +103,19 @@ def main() -> None:
     given = parser.parse_args()
     runs, long = (200, 6) if given.quick else (given.runs, 12)
     print(machine())
-    with tempfile.TemporaryDirectory() as folder, installed(Path(folder, "site")):
-        short_runs("local", 1, LocalEngine(1), runs)
-        short_runs("local", 2, LocalEngine(2), runs)
-        short_runs("dask", 2, DaskEngine(workers=2), runs // 10)
+    with tempfile.TemporaryDirectory() as made, installed(Path(made, "site")):
+        folder = Path(made)
+        short_runs("local", 1, LocalEngine(1), runs, folder / "local-1")
+        short_runs("local", 2, LocalEngine(2), runs, folder / "local-2")
+        short_runs("dask", 2, DaskEngine(workers=2), runs // 10, folder / "dask-2")
         for name, engines in {
             "local": (LocalEngine(1), LocalEngine(2)),
             "dask": (DaskEngine(workers=1), DaskEngine(workers=2)),
         }.items():
             load = os.getloadavg()[0]
-            one, two = (long_runs(engine, long) for engine in engines)
+            one, two = (
+                long_runs(engine, long, folder / f"{name}-long-{i}") for i, engine in enumerate(engines)
+            )
             print(
                 f"{name}: {long} runs that keep a core busy: {one:.1f} s with one worker, {two:.1f} s with "
                 f"two, {one / two:.2f} times as fast (load before: {load:.1f})"

@@ -119,7 +119,7 @@ def spread(
     return [found[i] for i in range(len(jobs))]
 
 
-def reason(error: Exception) -> str:
+def reason(error: BaseException) -> str:
     """Return what went wrong, in words for a user.
 
     Examples

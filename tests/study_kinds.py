@@ -62,6 +62,10 @@ def _badly(task: str, seed: int, marks: Path, text: str) -> Result:
             raise ZeroDivisionError("as asked")
         case "exit":
             sys.exit(3)
+        case "words":
+            raise WordlessError
+        case "no bytes":
+            raise ValueError("\udcff.maze")
         case "die":
             os.kill(os.getpid(), signal.SIGKILL)
         case "die once":
@@ -72,6 +76,13 @@ def _badly(task: str, seed: int, marks: Path, text: str) -> Result:
         case "nan":
             return Result({"sum": math.nan})
     return Result({"sum": 0.0}, details={"file": text})
+
+
+class WordlessError(Exception):
+    """An error that cannot be told in words."""
+
+    def __str__(self) -> str:
+        raise ValueError
 
 
 def abort(*_: object) -> None:

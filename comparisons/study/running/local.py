@@ -135,6 +135,7 @@ class LocalEngine:
             If workers cannot be started.
         """
         queue = _Queue(jobs)
+        self._failed_starts = 0
         try:
             while not stop():
                 self._hand_out(queue, limit)
@@ -171,7 +172,12 @@ class LocalEngine:
         free = self._most - len(self._workers)
         for _ in range(min(free, queue.ahead(self._most) - starting)):
             assert self._scratch is not None, "an engine works inside of its context only"
-            self._workers.append(Worker(self.name, Path(self._scratch.name)))
+            try:
+                self._workers.append(Worker(self.name, Path(self._scratch.name)))
+            except OSError as error:  # of processes, memory or open files
+                raise UserError(
+                    f"a worker process cannot be started ({error.strerror}); try fewer with --workers"
+                ) from error
 
     def _look(self, queue: _Queue, limit: float | None) -> list[Finished]:
         """Wait until something happens, but not for long; return the runs that have ended."""

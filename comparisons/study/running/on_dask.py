@@ -11,8 +11,8 @@ import logging
 import multiprocessing
 import time
 from collections import deque
-from collections.abc import Callable, Generator, Iterable
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Generator, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from datetime import datetime
 from itertools import islice
 from queue import Empty, SimpleQueue
@@ -29,7 +29,7 @@ from comparisons.study.spec import RunSpec
 from worlds import UserError
 
 try:
-    from distributed import Client, KilledWorker, LocalCluster, get_worker
+    from distributed import Client, KilledWorker, LocalCluster, Reschedule, Status, get_worker
 except ImportError as error:
     raise UserError(
         f'--engine dask: Dask is not installed ({error}); use: pip install "affordant[cluster]"'
@@ -38,11 +38,13 @@ except ImportError as error:
 _BREATH: Final = 0.1
 """Seconds after which it is looked whether to stop."""
 _PATIENCE: Final = 30.0
-"""Seconds to wait for a scheduler, and for its first worker."""
+"""Seconds to wait for a scheduler, and for workers where there are none."""
 _AHEAD: Final = 2
 """Runs handed out for each thread of a worker, so that none waits for the next."""
 _LOOK_ROUND: Final = 2.0
 """Seconds after which it is looked whether workers have come or gone."""
+_ENDS: Final = {Status.closing, Status.closed, Status.failed}
+"""Of a Dask worker that is told to end, or has lost its scheduler."""
 
 
 class DaskEngine:
@@ -70,6 +72,7 @@ class DaskEngine:
                 f"--workers {workers}: the scheduler at {scheduler} has its own; leave one of the two out"
             )
         self._scheduler = scheduler
+        self._told = "--engine dask" if scheduler is None else f"--scheduler {scheduler}"
         self._most = checked_workers(workers)
         self._open = ExitStack()
         self._client: Any = None  # much of distributed has no types
@@ -85,7 +88,7 @@ class DaskEngine:
                 client.wait_for_workers(1, timeout=_PATIENCE)
             except (OSError, ValueError) as error:  # a TimeoutError is an OSError
                 raise UserError(
-                    f"--scheduler {self._scheduler}: no scheduler with workers answers ({error}); start them "
+                    f"{self._told}: no scheduler with workers answers ({error}); start them "
                     "by `dask scheduler` and `dask worker ADDRESS`, and give the scheduler's address"
                 ) from error
             self._client = client
@@ -112,20 +115,28 @@ class DaskEngine:
         Raises
         ------
         UserError
-            If the scheduler is lost, or workers cannot carry out runs at all.
+            If the scheduler is lost, all workers are and none comes, or they cannot carry out runs at all.
         """
         client = self._client
         assert client is not None, "an engine works inside of its context only"
         coming = iter(jobs)
         under_way: dict[str, tuple[Any, RunSpec, datetime]] = {}
         ended: SimpleQueue[Any] = SimpleQueue()
-        most, looked = 0, float("-inf")
+        most, looked, there = 0, float("-inf"), time.monotonic()
         try:
             while not stop():
                 if time.monotonic() - looked > _LOOK_ROUND:
-                    most, looked = max(1, _AHEAD * sum(client.nthreads().values())), time.monotonic()
+                    with self._asking():
+                        threads = sum(client.nthreads().values())
+                    most, looked = max(1, _AHEAD * threads), time.monotonic()
+                    there = looked if threads else there
+                    if looked - there > _PATIENCE:
+                        raise UserError(
+                            f"{self._told}: no workers are left; start some, and resume the study"
+                        )
                 for spec in islice(coming, max(0, most - len(under_way))):
-                    future = client.submit(run_there, spec, limit, self.name, pure=False)
+                    with self._asking():
+                        future = client.submit(run_there, spec, limit, self.name, pure=False)
                     under_way[future.key] = (future, spec, utc_now())
                     future.add_done_callback(ended.put)
                 if not under_way:
@@ -137,17 +148,30 @@ class DaskEngine:
                     future.release()
         finally:
             # Workers look whether they are still wanted: see `run_there`.
-            client.cancel([future for future, _, _ in under_way.values()], force=True)
+            with suppress(Exception):  # a scheduler that is lost wants nothing
+                client.cancel([future for future, _, _ in under_way.values()], force=True)
+
+    @contextmanager
+    def _asking(self) -> Iterator[None]:
+        """Tell of a scheduler that does not answer, which distributed does by errors of any kind."""
+        try:
+            yield
+        except Exception as error:
+            raise self._lost(f"{type(error).__name__}: {error}") from error
+
+    def _lost(self, how: str) -> UserError:
+        return UserError(
+            f"{self._told}: the scheduler has lost runs ({how}); is it still up? Start it again, and resume "
+            "the study"
+        )
 
     def _outcome(self, future: Any, spec: RunSpec, started: datetime) -> Finished:
         if future.status == "finished":
-            finished: Finished = future.result()
+            with self._asking():
+                finished: Finished = future.result()
             return finished
         if future.status != "error":
-            raise UserError(
-                f"--scheduler {self._scheduler}: it has lost a run ({future.status}); is it still up? "
-                "Start it again, and resume the study"
-            )
+            raise self._lost(future.status)
         error = future.exception()
         if isinstance(error, KilledWorker):
             return lost(spec, "died", f"its Dask workers died: {error}", self.name, started)
@@ -165,15 +189,20 @@ def _connect(address: Any) -> Any:
 def _cluster(workers: int) -> Any:
     """Return a cluster on this machine, which nobody on another one can reach."""
     make: Any = LocalCluster
-    with interrupts_held():  # Ctrl-C is for us to obey
-        return make(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=None,
-            dashboard_address="127.0.0.1:0",  # any free port: another cluster may have the usual one
-            silence_logs=logging.CRITICAL,
-        )
+    try:
+        with interrupts_held():  # Ctrl-C is for us to obey
+            return make(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                memory_limit=None,
+                dashboard_address="127.0.0.1:0",  # any free port: another cluster may have the usual one
+                silence_logs=logging.CRITICAL,
+            )
+    except (OSError, RuntimeError) as error:
+        raise UserError(
+            f"--engine dask: its workers cannot be started here ({error}); try fewer with --workers"
+        ) from error
 
 
 _IDLE: Final[deque[LocalEngine]] = deque()
@@ -186,8 +215,8 @@ def _new_engine(name: str) -> LocalEngine:
     return engine
 
 
-def run_there(spec: RunSpec, limit: float | None, engine: str) -> Finished | None:
-    """Carry out a run in a Dask worker; return None if nobody wants it any more."""
+def run_there(spec: RunSpec, limit: float | None, engine: str) -> Finished:
+    """Carry out a run in a Dask worker, for as long as somebody wants it."""
     # Dask's nanny makes workers daemons, which may start no process; ours ends with its parent all the same.
     multiprocessing.current_process().daemon = False
     worker: Any = get_worker()
@@ -195,10 +224,16 @@ def run_there(spec: RunSpec, limit: float | None, engine: str) -> Finished | Non
 
     def unwanted() -> bool:
         task = worker.state.tasks.get(key)
-        return task is None or task.state == "cancelled"
+        return worker.status in _ENDS or task is None or task.state == "cancelled"
 
-    local = _IDLE.pop() if _IDLE else _new_engine(engine)
     try:
-        return next(local.execute([spec], limit, unwanted), None)
+        local = _IDLE.pop()
+    except IndexError:
+        local = _new_engine(engine)
+    try:
+        finished = next(local.execute([spec], limit, unwanted), None)
     finally:
         _IDLE.append(local)
+    if finished is None:
+        raise Reschedule  # nobody wants it; should that have changed meanwhile, it is done again
+    return finished

@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import get_context, resource_tracker
 from multiprocessing.connection import Connection
 from pathlib import Path
+from threading import Lock
 from typing import Final, Generic, TypeVar
 
 from comparisons.spread import begin_worker, one_thread_each
@@ -20,6 +21,9 @@ _CONTEXT: Final = get_context("spawn")
 _LAST_SECONDS: Final = 5.0
 """A process whose pipe has ended may take so long to end itself."""
 _INTERRUPT: Final = {signal.SIGINT}
+_ONE_AT_A_TIME: Final = Lock()
+"""Processes are started and ended by one thread at a time, where there are many, as in a Dask worker: threads
+share the environment that a process starts in, and multiprocessing's list of processes."""
 
 
 class Gone(Exception):  # noqa: N818 - an event, not a mistake
@@ -52,7 +56,7 @@ class Worker(Generic[T]):
         self._process = _CONTEXT.Process(
             target=_serve, args=(theirs, engine, scratch), name="affordant-worker", daemon=True
         )
-        with one_thread_each(), interrupts_held():
+        with _ONE_AT_A_TIME, one_thread_each(), interrupts_held():
             self._process.start()
         theirs.close()  # now the pipe ends when the worker does
         self.task: T | None = None
@@ -84,28 +88,28 @@ class Worker(Generic[T]):
         self.task, self.begun = task, False
 
     def news(self) -> Finished | None:
-        """Return the run that it has ended, None if there is nothing new; raises `Gone` if it has died."""
+        """Return the run that it has ended, None if it has ended none; raises `Gone` if it has died."""
         alive = self._process.is_alive()  # asked first: what it told just before its end is still read
-        if not self._pipe.poll():
-            if alive:
-                return None
-            raise self._departure()
-        try:
-            told: Finished | None = self._pipe.recv()
-        except (EOFError, OSError):
-            raise self._departure() from None
-        if told is not None:
-            self.task = None
-        elif self.up:
-            self.begun = True
-        self.up = True
-        return told
+        while self._pipe.poll():
+            try:
+                told: Finished | None = self._pipe.recv()
+            except (EOFError, OSError):
+                raise self._departure() from None
+            if told is not None:
+                self.task = None
+                return told
+            # Its first word says that it is up, each other one that it has begun.
+            self.up, self.begun = True, self.up
+        if alive:
+            return None
+        raise self._departure()
 
     def end(self) -> None:
         """End it, whatever it is at."""
-        self._process.kill()
-        self._process.join()
-        self._process.close()
+        with _ONE_AT_A_TIME:
+            self._process.kill()
+            self._process.join()
+            self._process.close()
         self._pipe.close()
 
     def _departure(self) -> Gone:

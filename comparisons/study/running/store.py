@@ -6,7 +6,7 @@ Every file appears whole or not at all, and carries the SHA-256 of what it says.
 ::
 
     study.yaml                          the study as it was given
-    files/                              texts of the files that it names, under their names quoted as in URLs
+    files/                              texts of the files that it names, under their names, with %2F for /
     runs/3f/3f0c...e1.json              results
     failures/9a7b...04.json             runs that gave none, and why
     damaged/                            files that were found damaged, out of the way
@@ -19,7 +19,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
-from urllib.parse import quote, unquote
+from urllib.parse import unquote
 
 from comparisons.outputs import new_directory
 from comparisons.study.kinds import Result
@@ -101,7 +101,7 @@ class Store:
                 for name in (_RUNS, _FAILURES, "files"):
                     (made / name).mkdir()
                 for name, content in files.items():
-                    _write(made / "files" / quote(name, safe=""), content)
+                    _write(made / "files" / _quoted(name), content)
         except OSError as error:
             raise UserError(f"{directory}: it cannot be written ({error.strerror}); name another") from error
         return cls(directory)
@@ -219,9 +219,12 @@ class Store:
         return damaged.path.rename(folder / next(name for name in names if name not in taken))
 
     def tidy(self) -> None:
-        """Remove what a driver that was killed left half-written; only for whoever holds the store."""
+        """Remove what a driver that was killed left half-done; only for whoever holds the store."""
         for path in self.directory.rglob(UNFINISHED):
             path.unlink(missing_ok=True)
+        for path in self._failure_files():
+            if self.path(path.stem).exists():  # see `save`
+                path.unlink()
 
     def _run_files(self) -> list[Path]:
         return sorted((self.directory / _RUNS).glob("*/*.json"))
@@ -268,6 +271,11 @@ def _spec_of(content: Mapping[str, Any], path: Path) -> RunSpec:
 def _place(path: Path, content: bytes) -> None:
     path.parent.mkdir(exist_ok=True)
     replace_file(path, content)
+
+
+# As in URLs, but for letters of other scripts: nine characters for one would soon make a name too long.
+def _quoted(name: str) -> str:
+    return name.replace("%", "%25").replace("/", "%2F")
 
 
 # The newlines stay as they are: a file's text is part of the hash of runs.

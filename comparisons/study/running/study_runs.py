@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import shlex
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -167,7 +167,7 @@ def _carry_out(
                 try:
                     store.save(finished)
                 except OSError as error:
-                    raise _unwritable(store, error, skipped + done, len(asked)) from error
+                    raise _unwritable(store, error, asked) from error
                 if isinstance(finished.outcome, Ran):
                     done += 1
                 else:
@@ -189,10 +189,11 @@ def _set_aside_damaged(store: Store) -> tuple[Damaged, ...]:
     return damaged
 
 
-def _unwritable(store: Store, error: OSError, kept: int | None = None, planned: int = 0) -> UserError:
-    """Return what to say where the store cannot be written: what is kept, and how to go on."""
+def _unwritable(store: Store, error: OSError, asked: Collection[str] = ()) -> UserError:
+    """Return what to say where the store cannot be written: how much is kept, and how to go on."""
     mend = "make room there" if error.errno in _FULL else "mend that"
-    told = "" if kept is None else f"; {kept} of {planned} runs are kept"
+    kept = len(set(asked).intersection(store.hashes()))  # counted anew: the folder itself may be gone
+    told = f"; {kept} of {len(asked)} runs are kept" if asked else ""
     go_on = f"affordant study resume {shlex.quote(str(store.directory))}"
     return UserError(
         f"{store.directory}: it cannot be written ({error.strerror}){told}; {mend}, then: {go_on}"

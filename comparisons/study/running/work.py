@@ -20,6 +20,7 @@ from worlds import UserError
 Reason = Literal["raised", "died", "too long"]
 """Why a run gave no result: it raised an error, its worker died, or it took longer than it may."""
 _INFINITE: Final = float("inf")
+_LARGEST: Final = 2**63 - 1
 
 
 @dataclass(frozen=True)
@@ -97,9 +98,8 @@ def work(spec: RunSpec, engine: str, scratch: Path | None = None) -> Finished:
 
     try:
         result = _result(spec, scratch)
-    except Exception as error:  # noqa: BLE001 - the store keeps it; the other runs go on
-        trace = tracebacks.format_exc()
-        return Finished(spec, Broke("raised", reason(error), trace, where()))
+    except BaseException as error:  # noqa: BLE001 - the store keeps it; the other runs go on
+        return Finished(spec, Broke("raised", _said(error), _writable(tracebacks.format_exc()), where()))
     return Finished(spec, Ran(result, where()))
 
 
@@ -112,6 +112,19 @@ def lost(
     return Finished(spec, Broke(why, message, "", told))
 
 
+def _said(error: BaseException) -> str:
+    """Return what went wrong, in words, also where the error has none itself."""
+    try:
+        return _writable(reason(error))
+    except Exception:  # noqa: BLE001 - it is the kind's own
+        return f"{type(error).__name__}, whose message raises an error"
+
+
+def _writable(text: str) -> str:
+    """Return a text with what no file can hold spelt out, such as bytes of a name that is no UTF-8."""
+    return text.encode(errors="backslashreplace").decode()
+
+
 def _result(spec: RunSpec, scratch: Path | None) -> Result:
     asked = kind(spec.kind)
     if asked.version != spec.version:
@@ -121,7 +134,8 @@ def _result(spec: RunSpec, scratch: Path | None) -> Result:
         )
     named = asked.files(spec.settings)
     if not named:
-        return checked_result(asked, asked.run(spec.settings, spec.seed))
+        # A copy: what the kind does to it must not change what the run is called.
+        return checked_result(asked, asked.run(dict(spec.settings), spec.seed))
     with TemporaryDirectory(prefix="affordant-", dir=scratch) as folder:
         result = checked_result(asked, asked.run(_laid(spec, named, Path(folder)), spec.seed))
         if folder in canonical([result.measures, result.curves, result.details]):
@@ -203,17 +217,24 @@ def _plain(value: Any, where: str) -> Any:
     if isinstance(value, str):
         value.encode()  # half a surrogate pair cannot be written down
         return str(value)
-    if isinstance(value, int):
-        return int(value)
-    if isinstance(value, float):
-        if not abs(value) < _INFINITE:
-            raise TypeError(f"{where} is {float(value)}, which is no finite number")
-        return float(value)
+    if isinstance(value, int | float):
+        return _plain_number(value, where)
     if isinstance(value, Mapping):
         for key in value:
             if type(key) is not str:
                 raise TypeError(f"{where} has the key {key!r}, which is no text")
+            key.encode()
         return {key: _plain(item, f"{where}.{key}") for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(item, f"{where}[{i}]") for i, item in enumerate(value)]
     raise TypeError(f"{where} is of type {type(value).__name__}, which is no plain data")
+
+
+def _plain_number(value: float, where: str) -> float:
+    if isinstance(value, int):
+        if not -_LARGEST <= value <= _LARGEST:
+            raise TypeError(f"{where} is an integer of more than 64 bits")
+        return int(value)
+    if not abs(value) < _INFINITE:
+        raise TypeError(f"{where} is {float(value)}, which is no finite number")
+    return float(value)

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from threading import Event, Thread
+from threading import Barrier, Event, Thread
 
 import pytest
 from study_kinds import abort, installed, spec
@@ -68,9 +68,9 @@ def check_bad_runs_beside_good_ones(engine: Engine) -> None:
     assert told["raise"] == ("raised", "ZeroDivisionError: as asked")
     assert told["nan"][0] == "raised"
     assert "a bug of the kind of run" in told["nan"][1]
-    assert told["die"][0] == told["exit"][0] == "died"
+    assert told["die"][0] == "died"
     assert "2 times: it was ended by SIGKILL; was the memory used up?" in told["die"][1]
-    assert "exit status 3" in told["exit"][1]
+    assert told["exit"] == ("raised", "SystemExit: 3")
     assert told["hang"] == ("too long", "it took longer than 2 seconds")
 
 
@@ -124,6 +124,49 @@ def test_workers_that_die_as_they_start_are_a_users_error(monkeypatch: pytest.Mo
         pytest.raises(UserError, match="worker processes die as they start: it was ended by SIGABRT"),
     ):
         list(engine.execute([spec()]))
+
+
+def test_a_worker_that_cannot_be_started_is_a_users_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where there may be no more processes or open files."""
+
+    def no_more(*_: object) -> None:
+        raise OSError(24, "Too many open files")
+
+    monkeypatch.setattr("comparisons.study.running.local.Worker", no_more)
+    with (
+        LocalEngine(1) as engine,
+        pytest.raises(UserError, match=r"started \(Too many open files\); try fewer"),
+    ):
+        list(engine.execute([spec()]))
+
+
+def test_a_run_that_ends_in_time_counts_whenever_it_is_looked_at() -> None:
+    """As where the driver waits for a slow disk meanwhile."""
+    with LocalEngine(1) as engine:
+        running = engine.execute([spec(seed) for seed in range(2)], limit=1.0)
+        assert isinstance(next(running).outcome, Ran)
+        time.sleep(1.2)  # the other one has been handed out
+        assert isinstance(next(running).outcome, Ran)
+
+
+def test_workers_started_by_many_threads_have_one_thread_each(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a Dask worker of many threads, whose own environment stays as it was."""
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    ready = Barrier(6)
+    told = []
+
+    def run(seed: int) -> None:
+        with LocalEngine(1) as engine:
+            ready.wait()
+            told.extend(engine.execute([spec(seed, task="threads")]))
+
+    threads = [Thread(target=run, args=(seed,)) for seed in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert [finished.outcome.result.details for finished in told] == [{"threads": "1"}] * 6
+    assert "OMP_NUM_THREADS" not in os.environ
 
 
 def test_jobs_are_drawn_as_workers_become_free() -> None:
@@ -221,12 +264,14 @@ def dask(*words: str, cwd: Path) -> Iterator[subprocess.Popen[bytes]]:
 
 @contextmanager
 def two_machines(tmp_path: Path, *words: str) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """Yield a scheduler's address and two workers, which share no folder."""
+    """Yield a scheduler's address, and two workers, which share no folder, and the scheduler."""
     here = tmp_path / "scheduler"
     with ExitStack() as stack:
         file = here / "scheduler.json"
         local = ("--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0")
-        stack.enter_context(dask("scheduler", *local, "--port", "0", "--scheduler-file", str(file), cwd=here))
+        scheduler = stack.enter_context(
+            dask("scheduler", *local, "--port", "0", "--scheduler-file", str(file), cwd=here)
+        )
         wait_until(lambda: file.exists() and b'"address"' in file.read_bytes(), "the scheduler")
         address = json.loads(file.read_bytes())["address"]
         workers = [
@@ -239,7 +284,7 @@ def two_machines(tmp_path: Path, *words: str) -> Iterator[tuple[str, list[subpro
             )
             for name in ("one", "two")
         ]
-        yield address, workers
+        yield address, [*workers, scheduler]
 
 
 def _just_begun(marks: Path, parent: int) -> bool:
@@ -273,6 +318,37 @@ def test_dask_workers_elsewhere_and_one_of_them_killed(tmp_path: Path, marks: Pa
         assert {outcome.result.details["text"] for outcome in found.values()} == {"this one"}
         assert any(len(pids) == 2 for pids in under_way(marks).values())  # the one that was lost
     wait_until(lambda: not any(alive(pid) for pids in under_way(marks).values() for pid in pids), "all ends")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("lost", "told"),
+    [(slice(2), "no workers are left; start some, and resume"), (slice(2, 3), "is it still up.* resume")],
+)
+def test_a_cluster_that_is_lost_is_told(
+    tmp_path: Path, marks: Path, monkeypatch: pytest.MonkeyPatch, lost: slice, told: str
+) -> None:
+    """All its workers or its scheduler: nobody waits for ever."""
+    with two_machines(tmp_path, "--no-nanny") as (address, processes), DaskEngine(address) as engine:
+        monkeypatch.setattr("comparisons.study.running.on_dask._PATIENCE", 1.0)
+        running = engine.execute([spec(0), spec(1, task="hang", mark=str(marks))])
+        assert next(running).spec.seed == 0
+        wait_until(lambda: under_way(marks), "the run that hangs")
+        for process in processes[lost]:
+            kill(process.pid)
+        with pytest.raises(UserError, match=told):
+            next(running)
+
+
+def test_a_cluster_of_our_own_that_does_not_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where memory is short; Dask tells of it by errors of its own."""
+
+    def fail(**_: object) -> None:
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr("comparisons.study.running.on_dask.LocalCluster", fail)
+    with pytest.raises(UserError, match=r"Nanny failed to start.\); try fewer"), DaskEngine(workers=2):
+        pass
 
 
 def test_a_scheduler_that_is_not_there(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -214,6 +214,26 @@ def test_damaged_runs_are_done_again(tmp_path: Path) -> None:
     assert {path.name for path in (out / "damaged").iterdir()} == {cut.name, flipped.name, swapped.name}
 
 
+def test_a_store_of_format_1_is_read(tmp_path: Path) -> None:
+    """As it was written by the first affordant that had stores; it is not made anew when formats change."""
+    out = tmp_path / "out"
+    shutil.copytree(Path(__file__).parent / "store_of_format_1", out)
+    store = Store(out)
+    assert store.files() == {"words/old words.txt": "wörds\n"}
+    asked = {planned.spec.hash: planned.spec for planned in study_of(store).expand()}
+    one, two = (store.read(run_hash) for run_hash in store.hashes())
+    assert (one.spec, two.spec) == (asked[one.spec.hash], asked[two.spec.hash])
+    assert (one.spec.seed, one.result.measures) == (1, {"sum": 1.3570107442539157})
+    assert list(one.result.curves["drawn"]) == ["i", "a"]
+    assert (one.result.details, one.provenance["host"]) == ({"text": "wörds\n"}, "old")
+    (failure,) = store.failures()
+    assert (failure.reason, failure.message) == ("raised", "ZeroDivisionError: as asked")
+    assert [entry.seconds for entry in index(store).values()] == [1.5, 1.5]
+    before = said(out)
+    assert resume_study(out, LocalEngine(1)) == Summary(planned=4, done=0, failed=2, skipped=2)
+    assert said(out) == before
+
+
 def test_results_that_are_no_longer_asked_for_are_told(tmp_path: Path) -> None:
     """As where a default has changed since; they stay."""
     out = tmp_path / "out"
@@ -326,6 +346,21 @@ def test_a_full_disk_stops_the_study(small_disk: Path) -> None:
     kept = len(Store(out).hashes())  # a small one may have found room meanwhile
     assert mount("-o", "remount,size=2m", str(small_disk)) == 0
     assert resume_study(out, LocalEngine(2)) == Summary(planned=60, done=60 - kept, failed=0, skipped=kept)
+
+
+def test_a_store_that_is_removed_meanwhile(tmp_path: Path) -> None:
+    """It holds nothing any more, which is what is told."""
+    out = tmp_path / "out"
+
+    def track(items: Any, *, total: int, description: str) -> Iterator[Any]:
+        assert (total, description) == (4, "runs")
+        for i, item in enumerate(items):
+            yield item
+            if i == 1:
+                shutil.rmtree(out)
+
+    with pytest.raises(UserError, match=r"No such file or directory\); 0 of 4 runs are kept; mend that"):
+        run_study(study(2), out, LocalEngine(1), track=track)
 
 
 def test_a_store_that_cannot_be_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

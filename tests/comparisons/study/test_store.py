@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,24 @@ def test_a_failure_lasts_until_there_is_a_result(store: Store) -> None:
         store.read(SPEC.hash)
     store.save(RAN)
     assert (store.failures(), store.hashes()) == ((), (SPEC.hash,))
+
+
+def test_a_failure_beside_a_result_is_forgotten(store: Store) -> None:
+    """As a driver leaves it that is killed between the two."""
+    store.save(BROKE)
+    failure = store.directory / "failures" / f"{SPEC.hash}.json"
+    content = failure.read_bytes()
+    store.save(RAN)
+    failure.write_bytes(content)
+    store.save(replace(BROKE, spec=other(4).spec))
+    store.tidy()
+    assert [failure.spec.seed for failure in store.failures()] == [4]
+
+
+def test_long_names_of_other_scripts_and_folders_can_be_kept(tmp_path: Path) -> None:
+    """One letter is three bytes, and stays so."""
+    files = {f"迷路/{80 * '迷'}": "a", "50%2F/b": "b"}
+    assert Store.create(tmp_path / "store", "study: mine", files).files() == files
 
 
 def test_a_store_begins_where_nothing_is(store: Store, tmp_path: Path) -> None:

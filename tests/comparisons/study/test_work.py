@@ -4,6 +4,7 @@ import json
 import os
 import subprocess
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from study_kinds import KIND, installed, spec
 
 from comparisons.study.kinds import Result
 from comparisons.study.running.provenance import git_state
+from comparisons.study.running.store import Store
 from comparisons.study.running.work import Broke, Ran, checked_result, work
 from comparisons.study.spec import RunSpec
 
@@ -69,6 +71,35 @@ def test_an_error_is_told_with_its_traceback() -> None:
     assert outcome.provenance["wall_seconds"] >= 0
 
 
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        ("words", "WordlessError, whose message raises an error"),
+        ("no bytes", r"ValueError: \udcff.maze"),
+        ("exit", "SystemExit: 3"),
+    ],
+)
+def test_an_error_of_any_kind_can_be_kept(tmp_path: Path, task: str, message: str) -> None:
+    """One run's error is its own failure, and never the driver's end."""
+    finished = work(spec(task=task), "local")
+    Store.create(tmp_path / "store", "study: s", {}).save(finished)
+    (failure,) = Store(tmp_path / "store").failures()
+    assert (failure.reason, failure.message) == ("raised", message)
+    assert "study_kinds.py" in failure.traceback
+
+
+def test_a_kind_that_changes_its_settings_changes_no_name(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The result would be kept as that of another run."""
+
+    def changing(settings: Any, _: int) -> Result:
+        settings["n"] = 99
+        return Result({})
+
+    monkeypatch.setattr("comparisons.study.running.work.kind", lambda _: replace(KIND, run=changing))
+    asked = spec(n=3)
+    assert work(asked, "local").spec.hash == asked.hash == spec(n=3).hash
+
+
 def test_a_path_in_a_result_is_a_bug() -> None:
     """It would be another one on every machine."""
     assert "temporary folder" in broke(spec(task="path", text="a", files={"a": ""})).message
@@ -87,6 +118,9 @@ def test_another_version_of_the_kind_is_refused() -> None:
         (None, "it returned NoneType"),
         (Result({"sum": float("inf")}), "measures.sum is inf, which is no finite number"),
         (Result({"sum": np.int64(3)}), "measures.sum is of type int64"),
+        (Result({"sum": 10**5000}), "measures.sum is an integer of more than 64 bits"),
+        (Result({}, {}, {"at": [-(2**64)]}), "details.at[0] is an integer of more than 64 bits"),
+        (Result({}, {}, {"\ud800": 1}), "surrogates not allowed"),
         (Result({"sum": True}), "measures.sum holds True, which is no number"),
         (Result({"sum": "3"}), "measures.sum holds '3', which is no number"),
         (Result({"some": 1.0}), "measure no such thing; use one of sum"),
@@ -107,8 +141,8 @@ def test_a_result_that_is_not_plain_is_a_bug_of_the_kind(result: Any, problem: s
 
 def test_numbers_of_numpy_become_plain() -> None:
     """Its floats are floats; tuples are lists, as JSON would give them back."""
-    checked = checked_result(KIND, Result({"sum.part": np.float64(0.5)}, {}, {"at": (1, (2, None))}))
-    assert type(checked.measures["sum.part"]) is float
+    checked = checked_result(KIND, Result({"sum": np.float64(0.5)}, {}, {"at": (1, (2, None))}))
+    assert type(checked.measures["sum"]) is float
     assert checked.details == {"at": [1, [2, None]]}
 
 
