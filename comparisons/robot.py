@@ -15,7 +15,8 @@ from planners import Affordance, Strategy
 from worlds import Cell, Change, Episode, Layout, MazeState, Outcome, Push, state_number
 
 MAX_STEPS = 100
-"""Primitive steps after which an episode is truncated; the longest optimal way is under a third of it."""
+"""Primitive steps after which an episode in the paper's maze is truncated; the longest optimal way is under a
+third of it."""
 
 
 class Eye(Protocol):
@@ -131,13 +132,24 @@ class Robot:
         Decides.
     eye
         Sees.
+    max_steps
+        Primitive steps after which an episode is truncated.
     """
 
-    def __init__(self, layout: Layout, grounded: GroundGraph, strategy: Strategy, eye: Eye) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        grounded: GroundGraph,
+        strategy: Strategy,
+        eye: Eye,
+        *,
+        max_steps: int = MAX_STEPS,
+    ) -> None:
         self.layout = layout
         self.grounded = grounded
         self.strategy = strategy
         self.eye = eye
+        self.max_steps = max_steps
 
     def run(self, episode: Episode, watch: Callable[[Moment], None] | None = None) -> Run:
         """Carry an episode to its end; `watch` is called before every step."""
@@ -145,7 +157,7 @@ class Robot:
         run = Run(belief.state, cells=[self.layout.cells[episode.state.robot]])
         self.eye.begin(episode)
         task: int | None = None
-        while not episode.reached and episode.steps < MAX_STEPS:
+        while not episode.reached and episode.steps < self.max_steps:
             decided = self._decide(episode, belief, task, run)
             if decided is None:
                 break
@@ -163,7 +175,7 @@ class Robot:
         if episode.reached:
             run.outcome = Outcome.REACHED
         else:
-            failure = Outcome.TRUNCATED if episode.steps >= MAX_STEPS else Outcome.NO_ROUTE
+            failure = Outcome.TRUNCATED if episode.steps >= self.max_steps else Outcome.NO_ROUTE
             run.outcome = self._blame(belief, episode, failure)
         return run
 

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +28,7 @@ from worlds import (
     maze_variables,
     suggest,
 )
+from worlds.entry_points import entry_points
 from worlds.four_rooms import AREAS, HALLWAYS, ROOMS, Rules, four_rooms_model, four_rooms_variables
 from worlds.hdg import LandmarkMaze, landmark_model, landmark_variables
 from worlds.taxi import SITES, TAXI_ACTIONS, taxi_model, taxi_variables

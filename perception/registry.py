@@ -10,13 +10,14 @@ factory: a callable that takes the `worlds.camera.Camera` and returns a `Backend
 from __future__ import annotations
 
 from collections.abc import Callable
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Final
 
 from perception.protocol import Backend
 from perception.truth import Truth
 from worlds import UserError, suggest
 from worlds.camera import Camera
+from worlds.entry_points import entry_points
 
 GROUP: Final = "affordant.perception"
 """The entry points' group."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Final, Protocol
 
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from hierarchy import GroundGraph
 from planners.option_critic.greedy import GreedyPolicy
+from worlds.entry_points import entry_points
 from worlds.errors import UserError, suggest
 
 Pieces = Generator[tuple[int, Mapping[str, float]], None, None]

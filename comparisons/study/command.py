@@ -43,8 +43,9 @@ def run(
 ) -> int:
     """Run a study into a new store, and keep every run as it ends.
 
-    Exit status 0 says that every run has a result, 1 that some failed (`affordant study status` tells which),
-    2 that nothing was run. Ctrl-C and SIGTERM stop it in order (130, 143); `affordant study resume` goes on.
+    Exit status 0 says that every run has a result, 1 that some failed, which
+    `affordant study status` tells, 2 that it could not begin or keep its results.
+    Ctrl-C and SIGTERM stop it in order (130, 143); `affordant study resume` goes on.
 
     Parameters
     ----------
@@ -64,11 +65,10 @@ def run(
         Only the first two seeds of each combination, for a first look; resume does the others.
     """
     from comparisons.study.declaring.declaration import load_study
-    from comparisons.study.figures.grouping import check_figures
+    from comparisons.study.figures.grouping import FIGURES
     from comparisons.study.running.study_runs import run_study
 
-    declared = load_study(file)
-    check_figures(declared.figures)
+    declared = load_study(file, FIGURES)
     asked = replace(declared, seeds=declared.seeds[:_QUICK]) if quick else declared
     with _progress() as track:
         done = run_study(asked, out, _engine(engine, scheduler, workers), limit=limit, track=track)
@@ -91,8 +91,14 @@ def resume(
     ----------
     directory
         The store that `affordant study run` made, on this machine or another.
-    engine, scheduler, workers, limit
-        As of `affordant study run`; another engine gives the same results.
+    engine
+        What carries out runs: local or dask; another one than before gives the same results.
+    scheduler
+        Address of a Dask scheduler. Defaults to a cluster on this machine.
+    workers
+        How many processes. Defaults to one for each core.
+    limit
+        Seconds that a run may take. Defaults to no limit.
     """
     from comparisons.study.running.study_runs import resume_study
 
@@ -144,20 +150,26 @@ def report(directory: Path, /, *, out: Path | None = None) -> int:
 def export(directory: Path, /, *, out: Path) -> int:
     """Write a study's results as a table, one row a run, and their curves as another one beside it.
 
+    Exit status 0 says that every run has a result, 1 that some have none, and no row.
+
     Parameters
     ----------
     directory
         The store.
     out
-        The file: .csv, or .parquet (extra "parquet").
+        The file: .csv, or .parquet (extra "parquet"). It is replaced, and so is NAME-curves beside it.
     """
     from comparisons.study.gathering import study_in
     from comparisons.study.results.exporting import export as write
 
     declared, store = study_in(directory)
-    for path in write(declared.expand(), store, out):
+    planned, kept = declared.expand(), set(store.hashes())
+    for path in write(planned, store, out):
         print(path)
-    return 0
+    missing = sum(run.spec.hash not in kept for run in planned)
+    if missing:
+        print(f"{missing:,} of {len(planned):,} runs have no result, and no row", file=sys.stderr)
+    return 1 if missing else 0
 
 
 @study.command
@@ -168,8 +180,10 @@ def diff(first: Path, second: Path, /) -> int:
 
     Parameters
     ----------
-    first, second
-        The stores.
+    first
+        A store.
+    second
+        Another one.
     """
     from comparisons.study.results.differences import diff as compare
     from comparisons.study.running.store import Store
@@ -186,17 +200,17 @@ def diff(first: Path, second: Path, /) -> int:
 def check(file: Path, /) -> int:
     """Check a study file and tell what it would run, without running anything.
 
+    Exit status 0 says that it could be run, 2 that it is wrong, and every mistake in it is told.
+
     Parameters
     ----------
     file
         The study file.
     """
     from comparisons.study.declaring.declaration import load_study
-    from comparisons.study.figures.grouping import check_figures
+    from comparisons.study.figures.grouping import FIGURES
 
-    declared = load_study(file)
-    check_figures(declared.figures)
-    print(declared.describe())
+    print(load_study(file, FIGURES).describe())
     return 0
 
 
@@ -251,7 +265,8 @@ def _ended(done: Summary, directory: Path, *, more: bool = False) -> int:
         return 128 + done.stopped
     print(", ".join(words))
     if done.others:
-        print(f"{done.others:,} results in the store are of no run of this study any more")
+        told = f"{done.others:,} results in the store are of no run of this study any more"
+        print(f"{told}: affordant study status {folder} tells why")
     if done.failed:
         print(f"why: affordant study status {folder}; to try again: affordant study resume {folder}")
     if more:

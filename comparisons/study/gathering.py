@@ -14,6 +14,7 @@ from comparisons.study.results.tables import Table
 from comparisons.study.running.records import DamagedError
 from comparisons.study.running.store import Damaged, Failure, Store
 from comparisons.study.running.study_runs import study_of
+from comparisons.study.spec import RunSpec
 
 _STATES: Final = ("done", "failed", "damaged", "to do")
 _TOLD: Final = 20
@@ -39,6 +40,8 @@ class Gathered:
         Runs that are still to do, those of damaged files among them.
     others
         Number of results that the study does not ask for: of kinds or defaults that have changed since.
+    why_others
+        In what the first of them differs from the run of the study that is nearest to it; "" without others.
     """
 
     study: Study
@@ -48,6 +51,7 @@ class Gathered:
     damaged: Sequence[Damaged]
     left: Sequence[Planned]
     others: int
+    why_others: str = ""
 
     @property
     def whole(self) -> bool:
@@ -87,8 +91,41 @@ def gather(study: Study, store: Store) -> Gathered:
             failures.append((run, failed[run_hash]))
         else:
             left.append(run)
-    others = len(kept - {run.spec.hash for run in planned})
-    return Gathered(study, rows, provenance, failures, damaged, left, others)
+    others = sorted(kept - {run.spec.hash for run in planned})
+    why = _why_other(store, others[0], planned) if others else ""
+    return Gathered(study, rows, provenance, failures, damaged, left, len(others), why)
+
+
+def _why_other(store: Store, run_hash: str, planned: Sequence[Planned]) -> str:
+    """Return in what a result that no run asks for differs from the nearest run."""
+    try:
+        other = store.read(run_hash).spec
+    except DamagedError as error:
+        return error.problem
+    found = min((differences(other, run.spec) for run in planned), key=len)
+    return f"{run_hash} differs from the nearest run in {', '.join(found)}"
+
+
+def differences(other: RunSpec, spec: RunSpec) -> list[str]:
+    """Return in what a spec differs from another one, in words.
+
+    Examples
+    --------
+    >>> was, now = {"gamma": 1}, {"gamma": 1.0, "lasting": 2}
+    >>> differences(RunSpec("learn", 1, was, seed=7), RunSpec("learn", 1, now, seed=0))
+    ['seed (7, now 0)', 'gamma (1, now 1.0)', 'lasting (none, now 2)']
+    """
+    was, now = _facts(other), _facts(spec)
+    names = [name for name in {**was, **now} if was.get(name) != now.get(name)]
+    told = [f"{name} ({was.get(name, 'none')}, now {now.get(name, 'none')})" for name in names]
+    files = {**other.files, **spec.files}
+    return told + [f"the file {name}" for name in files if other.files.get(name) != spec.files.get(name)]
+
+
+def _facts(spec: RunSpec) -> dict[str, str]:
+    """Return what a spec says but for its files, as text: 1 and 1.0 are not the same run."""
+    facts = {"kind": spec.kind, "version": spec.version, "seed": spec.seed, **spec.settings}
+    return {name: str(value) for name, value in facts.items()}
 
 
 def state_table(found: Gathered) -> Table:
@@ -134,7 +171,7 @@ def state_text(found: Gathered, directory: Path) -> str:
         lines.append(f"and {len(found.failures) - _TOLD:,} more in {folder}/failures")
     lines += [f"damaged: {one.path}: {one.problem}" for one in found.damaged]
     if found.others:
-        lines.append(f"{found.others:,} results are of no run of this study any more")
+        lines.append(f"{found.others:,} results are of no run of this study any more: {found.why_others}")
     if not found.whole:
         lines += ["", f"to go on: affordant study resume {folder}"]
     return "\n".join(lines)

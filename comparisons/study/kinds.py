@@ -10,13 +10,14 @@ pyproject.toml::
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint
 from typing import Any, Final, Literal
 
 from comparisons.study.spec import Value
 from worlds import UserError, suggest
+from worlds.entry_points import entry_points
 
 GROUP: Final = "affordant.runs"
 """The entry points' group."""
@@ -42,12 +43,15 @@ class Measure:
         Such as "steps"; "" for a share, which is shown in per cent.
     better
         Whether less or more of it is better; None if neither.
+    parts
+        Names of its parts, such as "GotoDoor", if runs measure ``optimal.GotoDoor`` besides ``optimal``.
     """
 
     name: str
     about: str
     unit: str = ""
     better: Literal["less", "more"] | None = None
+    parts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -58,8 +62,7 @@ class Result:
     ----------
     measures
         Numbers by name; None where there is nothing to tell: never reached, or never asked. A measure of the
-        kind that is left out counts as None; names with a dot, such as ``optimal.GotoDoor``, are parts of the
-        measure before the dot.
+        kind that is left out counts as None; names with a dot, such as ``optimal.GotoDoor``, are its parts.
     curves
         Tables by name: columns of equal length by name, the first one the abscissa.
     details
@@ -69,6 +72,15 @@ class Result:
     measures: Mapping[str, float | None]
     curves: Mapping[str, Mapping[str, Sequence[float | None]]] = field(default_factory=dict)
     details: Mapping[str, Any] = field(default_factory=dict)
+
+
+ReadText = Callable[[str], str]
+"""Returns the text of a file by the name that a study gives it, or raises a `UserError`."""
+
+
+def as_it_is(settings: Mapping[str, Value], _: ReadText) -> Mapping[str, Value]:
+    """Return complete settings: files have nothing to say about them before a run begins."""
+    return settings
 
 
 @dataclass(frozen=True)
@@ -91,6 +103,12 @@ class Kind:
     run
         Carries out a run, of complete settings and a seed. Names of files stand as paths then, to where the
         spec's texts have been laid on this machine; no path may find its way into the result.
+    settle
+        Makes complete settings into those that are run, once the texts of files can be read: fills in what
+        these say, such as the world that a task graph names, and refuses what could not run, as `complete`
+        does. What it fills in may name more files, for `files` to tell.
+    last_seed
+        The largest seed that there are data for; None if there are for any.
     """
 
     name: str
@@ -99,6 +117,8 @@ class Kind:
     complete: Callable[[Mapping[str, Value]], Mapping[str, Value]]
     files: Callable[[Mapping[str, Value]], Sequence[str]]
     run: Callable[[Mapping[str, Value], int], Result]
+    settle: Callable[[Mapping[str, Value], ReadText], Mapping[str, Value]] = as_it_is
+    last_seed: int | None = None
 
     def measure(self, name: str) -> Measure:
         """Return a measure by its name, or the one that a dotted name is a part of.
@@ -108,13 +128,18 @@ class Kind:
         UserError
             If there is none.
         """
-        whole, _, part = name.partition(".")
-        for measure in self.measures:
-            if measure.name == whole:
-                about = f"{measure.about}, {part}" if part else measure.about
-                return Measure(name, about, measure.unit, measure.better)
-        names = [measure.name for measure in self.measures]
-        raise UserError(f"{name}: runs of kind {self.name} measure no such thing; {suggest(whole, names)}")
+        whole, dot, part = name.partition(".")
+        measure = next((measure for measure in self.measures if measure.name == whole), None)
+        if measure is None:
+            names = [measure.name for measure in self.measures]
+            mend = suggest(whole, names)
+            raise UserError(f"{name}: runs of kind {self.name} measure no such thing; {mend}")
+        if not dot:
+            return measure
+        if part not in measure.parts:
+            mend = suggest(part, measure.parts, "its parts:") if measure.parts else f"use {whole}"
+            raise UserError(f"{name}: {whole} has no such part; {mend}")
+        return replace(measure, name=name, about=f"{measure.about}, {part}", parts=())
 
 
 def kind_names() -> tuple[str, ...]:

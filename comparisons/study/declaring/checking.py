@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from math import prod
 from typing import Final, NamedTuple
 
-from comparisons.study.declaring.completion import Combination, Completion, FileText
+from comparisons.study.declaring.completion import Combination, Completion
 from comparisons.study.declaring.factors import MOST_COMBINATIONS, Chosen, Factor, combinations, factors_of
 from comparisons.study.declaring.schema import AnswerText, SeedsText, StudyText, read_form
-from comparisons.study.declaring.written import LAST_SEED
-from comparisons.study.kinds import Kind, kind
+from comparisons.study.declaring.written import LAST_SEED, has_controls, is_nothing
+from comparisons.study.kinds import Kind, ReadText, kind
+from comparisons.study.results.sizes import has_ratio
 from hierarchy.text_nodes import Document, Path, path_text
 from worlds import UserError, suggest
 
@@ -32,11 +33,21 @@ class Checker:
     """Checks a study file; `faults` tells all that is wrong with it.
 
     What depends on a part of the file that is wrong is not looked at, for one mistake is to be told once.
+
+    Parameters
+    ----------
+    document
+        The study's file.
+    file_text
+        Reads files that it names.
+    figures
+        Names of the figures there are; None lets any pass.
     """
 
-    def __init__(self, document: Document, file_text: FileText) -> None:
+    def __init__(self, document: Document, file_text: ReadText, figures: Collection[str] | None) -> None:
         self.document = document
         self.file_text = file_text
+        self.known_figures = figures
         self.text, self.unsure, self.faults = read_form(document)
 
     def _fail(self, path: Path, problem: str, mend: str) -> None:
@@ -47,6 +58,7 @@ class Checker:
         asked = self._kind()
         factors = factors_of(self.text) if self._sure("vary") else ()
         seeds = self._seeds()
+        self._check_last_seed(seeds, asked)
         before = len(self.faults)
         self._check_names(factors)
         self._check_settings(factors)
@@ -99,18 +111,31 @@ class Checker:
                 self._fail(("seeds", place), f"the seed {seed} is {at} already", "remove one of the two")
         return given
 
+    def _check_last_seed(self, seeds: Sequence[int], asked: Kind | None) -> None:
+        """Refuse seeds that a kind has no data for."""
+        if asked is None or asked.last_seed is None:
+            return
+        largest = seeds[-1] if isinstance(seeds, range) else max(seeds)
+        if largest > asked.last_seed:
+            path = ("seeds",) if isinstance(seeds, range) else ("seeds", seeds.index(largest))
+            problem = f"kind {asked.name} has seeds 0 to {asked.last_seed}, and none of {largest}"
+            self._fail(path, problem, "give seeds among these")
+
     def _check_names(self, factors: Sequence[Factor]) -> None:
         """Refuse names and labels that nothing could be called by."""
         for factor in factors:
             path = ("vary", factor.name)
-            if not factor.name.strip():
+            if is_nothing(factor.name.strip()):
                 self._fail(path, "a factor has no name", "write NAME: [FIRST, SECOND]")
-            if factor.name == "seed":
+            if any(map(has_controls, (factor.name, *factor.labels))):
+                problem = "a control character, such as a line's end, cannot stand in a name or label"
+                self._fail(("vary",), problem, "remove it")
+            if factor.name in ("seed", "seeds"):
                 mend = "give seeds: [FIRST, SECOND] instead"
                 self._fail(path, "every combination is run with every seed, so this is no factor", mend)
             firsts: dict[str, int] = {}
             for place, label in enumerate(factor.labels):
-                if not label.strip():
+                if is_nothing(label.strip()):
                     self._fail((*path, label), "a label is empty", "write LABEL: {SETTING: VALUE}")
                 if firsts.setdefault(label, place) != place:
                     at = path_text((*path, firsts[label]))
@@ -178,9 +203,13 @@ class Checker:
             return
         if asked is not None:
             try:
-                asked.measure(answer.measure)
+                measure = asked.measure(answer.measure)
             except UserError as error:
                 self._told(("answer", "measure"), error)
+            else:
+                if answer.normalise != "none" and not has_ratio(measure):
+                    problem = f"numbers of {answer.measure} have no ratios: it is a share, or more is better"
+                    self._fail(("answer", "normalise"), problem, "leave it out, or answer by another measure")
         if self._sure("vary"):
             self._check_within(answer, factors)
             self._check_against(answer, factors, chosen)
@@ -217,5 +246,8 @@ class Checker:
     def _check_figures(self) -> None:
         figures = self.text.figures or []
         for place, name in enumerate(figures):
+            path = ("figures", place)
             if name in figures[:place]:
-                self._fail(("figures", place), f"{name} is given twice", "remove one of the two")
+                self._fail(path, f"{name} is given twice", "remove one of the two")
+            elif self.known_figures is not None and name not in self.known_figures:
+                self._fail(path, f"there is no figure {name!r}", suggest(name, self.known_figures))

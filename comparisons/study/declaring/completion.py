@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import PurePosixPath
 from typing import Final
 
 from comparisons.study.declaring.factors import Chosen, Factor
-from comparisons.study.kinds import Kind
+from comparisons.study.kinds import Kind, ReadText
 from comparisons.study.spec import RunSpec, Value, canonical
 from hierarchy.text_nodes import Document, Fault, Path
 from worlds import UserError
 
-FileText = Callable[[str], str]
-"""Returns the text of a file by the name that a study gives it, or raises a `UserError`."""
 _NAME: Final = re.compile(r"([\w.-]+): ")
 
 
@@ -71,7 +69,7 @@ class Completion:
         kind: Kind,
         settings: Mapping[str, Value],
         factors: Sequence[Factor],
-        file_text: FileText,
+        file_text: ReadText,
     ) -> None:
         self.document = document
         self.kind = kind
@@ -90,8 +88,12 @@ class Completion:
                 found.append(self._completed(chosen))
             except _WrongError as error:
                 wrong[error.wrong].append(chosen)
+        refused = Counter[Path]()
         for each, where in wrong.items():
-            self._tell(each, where, every)
+            refused[each.path] += len(where)
+        concerned = self._concerned(wrong, every)
+        for each, where in wrong.items():
+            self._tell(each, where, concerned[each.path], refused[each.path])
         if not self.faults:
             self._refuse_same(found, every)
         return () if self.faults else tuple(found)
@@ -101,20 +103,24 @@ class Completion:
         for level in chosen:
             given.update(level.settings)
         try:
-            settings = dict(self.kind.complete(given))
-            spec = RunSpec(self.kind.name, self.kind.version, settings, seed=0)
+            complete = self.kind.complete(given)
+            for setting in self.kind.files(complete):
+                self._file_of(setting, complete)
+            settings = dict(self.kind.settle(complete, self._file))
+            files = {str(settings[name]): self._file_of(name, settings) for name in self.kind.files(settings)}
+            spec = RunSpec(self.kind.name, self.kind.version, settings, 0, files)
         except UserError as error:
             name, problem = _split(str(error), given)
             raise self._wrong(name, problem, chosen) from error
-        files = {}
-        for setting in self.kind.files(settings):
-            name = str(settings[setting])
-            try:
-                files[name] = self._file(name)
-            except UserError as error:
-                raise self._wrong(setting, str(error), chosen) from error
         levels = {factor.name: level.label for factor, level in zip(self.factors, chosen, strict=True)}
-        return Combination(levels, spec.settings, files)
+        return Combination(levels, spec.settings, spec.files)
+
+    def _file_of(self, setting: str, settings: Mapping[str, Value]) -> str:
+        """Return the text of the file that a setting names."""
+        try:
+            return self._file(str(settings[setting]))
+        except UserError as error:
+            raise UserError(f"{setting}: {error}") from error
 
     def _file(self, name: str) -> str:
         if name not in self.texts:
@@ -142,16 +148,27 @@ class Completion:
                 return factor.place(level, setting)
         return ("settings", setting)
 
-    def _tell(self, wrong: _Wrong, where: list[Chosen], every: Sequence[Chosen]) -> None:
-        """Add a fault; where not every combination with the setting has it, say which ones do."""
-        setting = str(wrong.path[-1]) if isinstance(wrong.path[-1], str) else str(wrong.path[1])
-        concerned = every
-        if len(wrong.path) > 1:
-            concerned = [chosen for chosen in every if self._place(setting, chosen) == wrong.path]
-        told = ""
+    def _concerned(self, wrong: Iterable[_Wrong], every: Sequence[Chosen]) -> Mapping[Path, Sequence[Chosen]]:
+        """Return the combinations that have a setting from a place in the file where something is wrong."""
+        found: defaultdict[Path, list[Chosen]] = defaultdict(list, {("settings",): list(every)})
+        for setting in {_setting(each.path) for each in wrong if len(each.path) > 1}:
+            for chosen in every:
+                found[self._place(setting, chosen)].append(chosen)
+        return found
+
+    def _tell(self, wrong: _Wrong, where: list[Chosen], concerned: Sequence[Chosen], refused: int) -> None:
+        """Add a fault; where not every combination with the setting has it, say which ones do.
+
+        `refused` combinations have a fault in the same place; where the others have none, the setting is well
+        meant, and only for them.
+        """
+        told, mend = "", wrong.mend
         if len(where) < len(concerned):
             told = f" (where {self._common(wrong.path, where, concerned)})"
-        self.faults.append(self.document.fault(wrong.path, wrong.problem + told, wrong.mend))
+        if refused < len(concerned) and len(wrong.path) > 1:
+            levels = "give it to the levels under vary that it is for"
+            mend = f"{levels if wrong.path[0] == 'settings' else 'name these under leave_out'}, or {mend}"
+        self.faults.append(self.document.fault(wrong.path, wrong.problem + told, mend))
 
     def _common(self, path: Path, where: list[Chosen], concerned: Sequence[Chosen]) -> str:
         """Return what combinations have in common that others have not, or else the first of them."""
@@ -188,8 +205,7 @@ class Completion:
         """Return where in the file a combination begins to differ from another one."""
         for factor, one, other in zip(self.factors, first, second, strict=True):
             if one is not other:
-                place = factor.labels.index(other.label)
-                return ("vary", factor.name, other.label if factor.bundled else place)
+                return factor.place(other)
         raise AssertionError("a combination came twice")
 
 
@@ -199,6 +215,11 @@ class _WrongError(Exception):
     def __init__(self, wrong: _Wrong) -> None:
         super().__init__(wrong.problem)
         self.wrong = wrong
+
+
+def _setting(path: Path) -> str:
+    """Return the setting that a place in the file gives; a value of a factor's has the factor's name."""
+    return str(path[-1]) if isinstance(path[-1], str) else str(path[1])
 
 
 def _split(message: str, given: Iterable[str]) -> tuple[str | None, str]:

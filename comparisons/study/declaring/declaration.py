@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from comparisons.study.declaring.checking import Checked, Checker
-from comparisons.study.declaring.completion import Combination, FileText
+from comparisons.study.declaring.completion import Combination
 from comparisons.study.declaring.factors import Factor
-from comparisons.study.declaring.schema import Statistic
+from comparisons.study.declaring.schema import Normalise, Statistic
+from comparisons.study.kinds import ReadText
 from comparisons.study.spec import RunSpec, Value
 from hierarchy.text_files import file_text
 from hierarchy.text_nodes import LARGEST, Fault, FaultyTextError, TaskGraphTextError, read_yaml
@@ -46,6 +47,8 @@ class Answer:
         Factors at each of whose levels the comparison is made by itself.
     statistic
         What sums up the runs that are compared: "iqm", "median" or "mean".
+    normalise
+        What numbers are divided by: "none", or "against", the median of that level's runs of the same task.
     """
 
     measure: str
@@ -53,6 +56,7 @@ class Answer:
     against: str
     within: tuple[str, ...] = ()
     statistic: Statistic = "iqm"
+    normalise: Normalise = "none"
 
 
 @dataclass(frozen=True)
@@ -135,9 +139,10 @@ class Study:
         ]
         if (answer := self.answer) is not None:
             within = f", within {' and '.join(answer.within)}" if answer.within else ""
+            counted = "" if answer.normalise == "none" else ", in medians of that level by task"
             lines.append(
                 f"answered by {answer.measure} ({answer.statistic}) of each {answer.compare} "
-                f"against {answer.against}{within}"
+                f"against {answer.against}{within}{counted}"
             )
         return "\n".join(lines)
 
@@ -151,13 +156,16 @@ class Study:
         return f"{number:,} seeds, {shown}{', ...' if number > _LISTED else ''}"
 
 
-def load_study(path: str | Path) -> Study:
+def load_study(path: str | Path, figures: Collection[str] | None = None) -> Study:
     """Read a study from its file; files that its settings name are looked for in the same folder.
 
     Parameters
     ----------
     path
         A YAML file, in the form that docs/studies.md describes.
+    figures
+        Names of the figures that there are, of which the file may name some. None lets any pass: which there
+        are is no affair of runs.
 
     Raises
     ------
@@ -173,7 +181,7 @@ def load_study(path: str | Path) -> Study:
         missing = f"there is no such file; put it beside {path.name}, or mend its name"
         return file_text(path.parent / name, missing)
 
-    return _parsed(text, str(path), beside)
+    return _parsed(text, str(path), beside, figures)
 
 
 def parse_study(text: str, source: str = "the study", files: Mapping[str, str] | None = None) -> Study:
@@ -218,7 +226,7 @@ def parse_study(text: str, source: str = "the study", files: Mapping[str, str] |
     return _parsed(text, source, among)
 
 
-def _parsed(text: str, source: str, read: FileText) -> Study:
+def _parsed(text: str, source: str, read: ReadText, figures: Collection[str] | None = None) -> Study:
     lines = (line.partition("#")[0].strip() for line in text.splitlines())
     if not any(line and line != "---" for line in lines):
         raise StudyError(source, [Fault(1, "", "the text is empty", "begin it with study: NAME")])
@@ -229,7 +237,7 @@ def _parsed(text: str, source: str, read: FileText) -> Study:
         document = read_yaml(text, source)
     except TaskGraphTextError as error:
         raise StudyError(source, list(error.faults)) from error
-    checker = Checker(document, read)
+    checker = Checker(document, read, figures)
     checked = checker.checked()
     if checked is None:
         raise StudyError(source, checker.faults)
@@ -240,7 +248,9 @@ def _study(checked: Checked, source: str, text: str) -> Study:
     form = checked.text
     answer = None
     if (told := form.answer) is not None:
-        answer = Answer(told.measure, told.compare, told.against, tuple(told.within), told.statistic)
+        answer = Answer(
+            told.measure, told.compare, told.against, tuple(told.within), told.statistic, told.normalise
+        )
     return Study(
         name=form.study,
         title=form.title or form.study,

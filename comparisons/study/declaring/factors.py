@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import prod
 from typing import Final
@@ -49,10 +50,14 @@ class Factor:
     levels: tuple[Level, ...]
     bundled: bool = False
 
-    @property
+    @cached_property
     def labels(self) -> tuple[str, ...]:
         """The levels' labels."""
         return tuple(level.label for level in self.levels)
+
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {label: place for place, label in enumerate(self.labels)}
 
     @property
     def numbers(self) -> tuple[float, ...] | None:
@@ -68,11 +73,11 @@ class Factor:
             found.append(float(value))
         return tuple(found)
 
-    def place(self, level: Level, setting: str) -> Path:
-        """Return where in the file a level sets a setting."""
+    def place(self, level: Level, *setting: str) -> Path:
+        """Return where in the file a level stands, or where it sets a setting."""
         if self.bundled:
-            return ("vary", self.name, level.label, setting)
-        return ("vary", self.name, self.labels.index(level.label))
+            return ("vary", self.name, level.label, *setting)
+        return ("vary", self.name, self._places[level.label])
 
 
 Chosen = tuple[Level, ...]

@@ -15,10 +15,20 @@ from pydantic import (
     PlainValidator,
     Tag,
     ValidationError,
+    model_validator,
 )
 from pydantic.json_schema import WithJsonSchema
 
-from comparisons.study.declaring.written import LAST_SEED, Written, count, label, seed, written
+from comparisons.study.declaring.written import (
+    LAST_SEED,
+    Written,
+    count,
+    has_controls,
+    is_nothing,
+    label,
+    seed,
+    written,
+)
 from hierarchy.text_nodes import Document, Fault, Path
 from worlds import suggest
 from worlds.errors import nearest
@@ -27,8 +37,10 @@ SCHEMA: Final = "study.schema.json"
 """The JSON Schema's file, beside this module."""
 Statistic = Literal["iqm", "median", "mean"]
 """What sums up the runs of one combination: the interquartile mean, the median or the mean."""
+Normalise = Literal["none", "against"]
+"""What numbers are divided by, task by task: nothing, or the median of the level compared with."""
 
-_SCALAR: Final = {"type": ["string", "number", "boolean"]}
+_SCALAR: Final = {"type": ["string", "number", "boolean"], "minLength": 1}
 _STAND_INS: Final = {"study": "none", "question": "none", "kind": "none", "seeds": "1"}  # for what is wrong
 _KEYS: Final = ("it is no mapping of keys to values", "write keys with values")
 _WORDS: Final = {  # pydantic's kinds of error in ours: the problem, and a mend
@@ -43,11 +55,16 @@ _WORDS: Final = {  # pydantic's kinds of error in ours: the problem, and a mend
 
 def _line(given: Any) -> Any:
     """Return text in one line: a file may fold it over several."""
-    return " ".join(given.split()) if isinstance(given, str) else given
+    if not isinstance(given, str):
+        return given
+    line = "" if is_nothing(given) else " ".join(given.split())
+    if has_controls(line):
+        raise ValueError("a control character cannot stand here; remove it")
+    return line
 
 
 def _empty_or_mapping(given: Any) -> Any:
-    return {} if given == "" else given
+    return {} if is_nothing(given) else given
 
 
 def _seeds_form(given: Any) -> str:
@@ -58,11 +75,28 @@ def _levels_form(given: Any) -> str:
     return "bundles" if isinstance(given, dict) else "values"
 
 
+def _may_be_null(schema: dict[str, Any]) -> None:
+    """Let a model's schema say that what may be left out may also hold nothing."""
+    for name, shown in schema["properties"].items():
+        if name not in schema["required"] and {"type": "null"} not in shown.get("anyOf", ()):
+            form = [key for key in shown if key not in ("default", "description", "title")]
+            shown["anyOf"] = [{key: shown.pop(key) for key in form}, {"type": "null"}]
+
+
 class _Model(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, json_schema_extra=_may_be_null)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_nothing(cls, given: Any) -> Any:
+        """Leave out what holds nothing, such as the key of a list whose items are comments just now."""
+        if not isinstance(given, dict):
+            return given
+        optional = {name for name, field in cls.model_fields.items() if not field.is_required()}
+        return {key: value for key, value in given.items() if key not in optional or not is_nothing(value)}
 
 
-Line = Annotated[str, Field(min_length=1), BeforeValidator(_line)]
+Line = Annotated[str, Field(min_length=1), BeforeValidator(_line), WithJsonSchema(_SCALAR)]
 WrittenValue = Annotated[Written, PlainValidator(written), WithJsonSchema(_SCALAR)]
 Label = Annotated[str, PlainValidator(label), WithJsonSchema(_SCALAR)]
 _OF_SEEDS: Final = {"type": "integer", "maximum": LAST_SEED}
@@ -96,6 +130,10 @@ class AnswerText(_Model):
         list[Label], Field(description="Factors at each of whose levels the comparison is made by itself")
     ] = []
     statistic: Annotated[Statistic, Field(description="What sums up the runs that are compared")] = "iqm"
+    normalise: Annotated[
+        Normalise,
+        Field(description="against: count each task's numbers in its median of the level compared with"),
+    ] = "none"
 
 
 class StudyText(_Model):
@@ -115,7 +153,6 @@ class StudyText(_Model):
     settings: Annotated[Bundle, Field(description="Settings that every run has")] = {}
     vary: Annotated[
         dict[str, Levels],
-        BeforeValidator(_empty_or_mapping, json_schema_input_type=dict[str, Levels] | None),
         Field(
             description="The factors. Each has levels: a list of values of the setting of its name, or "
             "labels with the settings that each stands for"
@@ -203,7 +240,7 @@ def _fault(document: Document, error: dict[str, Any]) -> Fault:
     if kind == "missing":
         return document.fault(path[:-1], f"{last!r} is missing", f"add {last}: ...")
     if kind == "literal_error":
-        mend = suggest(str(error["input"]), get_args(Statistic))
+        mend = suggest(str(error["input"]), get_args(Normalise if last == "normalise" else Statistic))
         return document.fault(path, f"there is no {last} {error['input']!r}", mend)
     if kind == "value_error":
         problem, _, mend = str(error["ctx"]["error"]).partition("; ")

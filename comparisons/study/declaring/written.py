@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from typing import Any, Final, NamedTuple
+from unicodedata import category
 
 from comparisons.study.spec import Value
 
@@ -12,7 +13,7 @@ LAST_SEED: Final = 2**63 - 1
 _WHOLE: Final = re.compile(r"[-+]?[0-9]+(_[0-9]+)*")
 _NUMBER: Final = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
 _TRUTH: Final = {"true": True, "false": False}
-_NOTHING: Final = ("", "~", "null")
+_NOTHING: Final = ("", "~", "null")  # in whatever case
 _LONGEST: Final = 40  # digits, leading zeros among them; far more than any number needs
 
 
@@ -21,6 +22,24 @@ class Written(NamedTuple):
 
     text: str
     value: Value
+
+
+def is_nothing(given: Any) -> bool:
+    """Return whether that is how YAML writes that there is nothing.
+
+    >>> is_nothing(""), is_nothing("Null"), is_nothing("none"), is_nothing([])
+    (True, True, False, False)
+    """
+    return isinstance(given, str) and given.lower() in _NOTHING
+
+
+def has_controls(text: str) -> bool:
+    r"""Return whether a text has control characters, which a table or a terminal would take for its own.
+
+    >>> has_controls("λ, 0.9"), has_controls("two\nlines")
+    (False, True)
+    """
+    return any(category(letter) == "Cc" for letter in text)
 
 
 def value_of(text: str) -> Value:
@@ -39,7 +58,7 @@ def value_of(text: str) -> Value:
     >>> [value_of(text) for text in ("true", "20", "1_000", "1e3", ".5", "no", "1.2.3", "maxq-0")]
     [True, 20, 1000, 1000.0, 0.5, 'no', '1.2.3', 'maxq-0']
     """
-    if text.lower() in _NOTHING:
+    if is_nothing(text):
         raise ValueError("it is empty; give a value, or leave it out")
     if text.lower() in _TRUTH:
         return _TRUTH[text.lower()]
@@ -65,6 +84,8 @@ def written(given: Any) -> Written:
 
 def label(given: Any) -> str:
     """Return a level's label; lists and mappings are refused."""
+    if is_nothing(given):
+        raise ValueError("it is empty; write a name as it stands under vary")
     if isinstance(given, str):
         return given
     raise ValueError("this is no single label; write one as it stands under vary")
@@ -77,14 +98,14 @@ def seed(given: Any) -> int:
 
 def count(given: Any) -> int:
     """Return how many seeds there are, at least one."""
-    return _at_least(given, 1, "number of seeds")
+    return _at_least(given, 1, "number of seeds", ", a list, or {first: 100, count: 20}")
 
 
-def _at_least(given: Any, least: int, what: str) -> int:
+def _at_least(given: Any, least: int, what: str, other: str = "") -> int:
     number = _whole(given) if isinstance(given, str) and _WHOLE.fullmatch(given) else None
     if number is None or number < least:
         shown = given if isinstance(given, str) and given else "this"
-        raise ValueError(f"{shown} is no {what}; give a whole number from {least} to {LAST_SEED}")
+        raise ValueError(f"{shown} is no {what}; give a whole number from {least} to {LAST_SEED}{other}")
     return number
 
 

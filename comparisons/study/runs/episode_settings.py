@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from typing import Final
 
-from comparisons.study.runs.settings import Setting, completed
+from comparisons.study.kinds import ReadText
+from comparisons.study.runs.settings import NO_CORRUPTION, Setting, check_corruption, completed
 from comparisons.study.spec import Value
+from hierarchy import checked, two_rooms
 from perception.corruptions import CORRUPTIONS, SEVERITIES
 from perception.registry import backend_names, load_backend
-from worlds import Layout, UserError, layout_names, load_layout, suggest
+from worlds import Layout, UserError, layout_names, load_layout, maze_model, parse_layout, suggest
 from worlds.appearing import ON_THE_WAY
 
-NO_CORRUPTION: Final = "none"
 MOST: Final = 20
 """Obstacles of an episode, at most."""
 _FILE: Final = ".maze"
@@ -50,9 +52,8 @@ def complete(given: Mapping[str, Value]) -> Mapping[str, Value]:
     worlds.errors.UserError: obstacles: 21 is not possible; give a whole number from 0 to 20
     """
     settings = completed(_SETTINGS, given)
+    check_corruption(settings)
     spoilt = settings["corruption"] != NO_CORRUPTION
-    if settings["severity"] and not spoilt:
-        raise UserError(f"severity: {settings['severity']} of no corruption; name a corruption, or give 0")
     if spoilt and not load_backend(str(settings["perception"])).needs_frames:
         raise UserError(
             f"corruption: {settings['corruption']!r} spoils frames, and perception "
@@ -62,7 +63,7 @@ def complete(given: Mapping[str, Value]) -> Mapping[str, Value]:
     name = str(settings["layout"])
     if name in layout_names():
         check_room(layout_of(name), int(settings["obstacles"]))
-    elif not name.endswith(_FILE):  # what a file holds is checked as it is run
+    elif not name.endswith(_FILE):  # what a file holds is for `settle`
         mend = suggest(name, layout_names(), f"name a {_FILE} file, or one of")
         raise UserError(f"layout: there is no layout {name!r}; {mend}")
     return settings
@@ -71,6 +72,31 @@ def complete(given: Mapping[str, Value]) -> Mapping[str, Value]:
 def files(settings: Mapping[str, Value]) -> Sequence[str]:
     """Return which settings name files: the layout, unless it comes with the package."""
     return () if settings["layout"] in layout_names() else ("layout",)
+
+
+def settle(settings: Mapping[str, Value], read: ReadText) -> Mapping[str, Value]:
+    """Return complete settings as they are, if a layout of the user's own has all that they ask for.
+
+    Raises
+    ------
+    UserError
+        If it has not; the message begins with a setting's name.
+    """
+    if files(settings):
+        name = str(settings["layout"])
+        check_room(_layout_within(read(name), name), int(settings["obstacles"]))
+    return settings
+
+
+@lru_cache(maxsize=64)
+def _layout_within(text: str, name: str) -> Layout:
+    """Return a layout that a text describes, if the robot's tasks can be learnt in it."""
+    try:
+        layout = parse_layout(text, name)
+        checked(two_rooms(layout), maze_model(layout))
+    except UserError as error:
+        raise UserError(f"layout: {error}") from error
+    return layout
 
 
 def layout_of(name: str) -> Layout:

@@ -17,14 +17,14 @@ from comparisons.dynamic import random_episode
 from comparisons.eyes import Sight
 from comparisons.learning import PairLearner
 from comparisons.perception_price import Spoilt
-from comparisons.robot import Robot, Run
+from comparisons.robot import MAX_STEPS, Robot, Run
 from comparisons.study.kinds import Kind, Measure, Result
-from comparisons.study.runs.episode_settings import check_room, complete, files, layout_of
+from comparisons.study.runs.episode_settings import check_room, complete, files, layout_of, settle
 from comparisons.study.runs.judging import Judged, Ledger, Once, counterexample_data, judged, smallest
 from comparisons.study.spec import Value
 from hierarchy import GroundGraph, checked, two_rooms
 from perception.registry import load_backend
-from planners import LocalRule, Replanning, Strategy
+from planners import LocalRule, MaxQ, Replanning, Strategy
 from planners.resweep import Experience, Remembering, ValueSweep
 from worlds import Outcome, maze_model, parse_layout
 from worlds.appearing import shortest_way
@@ -34,7 +34,11 @@ from worlds.twin import Twin
 
 MEASURES: Final = (
     Measure(
-        "optimal", "share of affordances that are proved optimal first actions of their subtask", "", "more"
+        "optimal",
+        "share of affordances that are proved optimal first actions of their subtask",
+        "",
+        "more",
+        ("GotoTrigger", "GotoDoor", "GotoGoal", "cube", "sphere"),
     ),
     Measure("fatal", "share of affordances after which the subtask has no way left", "", "less"),
     Measure("silent", "share of affordances without any action, though there is a way", "", "less"),
@@ -50,6 +54,9 @@ MEASURES: Final = (
     Measure("asked", "affordances of obstacles on the route, where there is a way", "affordances"),
     Measure("boxed_in", "obstacles on the route that leave the subtask no way", "obstacles"),
     Measure("misread", "share of looks ahead that tell a wrong shape or distance", "", "less"),
+    Measure(
+        "unlearnt", "grids from which a learnt subtask takes other than the fewest steps", "grids", "less"
+    ),
 )
 
 
@@ -80,7 +87,7 @@ def run(settings: Mapping[str, Value], seed: int) -> Result:
     return Episodes(settings, seed).result()
 
 
-EPISODES: Final = Kind("episodes", 1, MEASURES, complete, files, run)
+EPISODES: Final = Kind("episodes", 1, MEASURES, complete, files, run, settle)
 
 
 @dataclass
@@ -124,6 +131,7 @@ class Episodes:
         check_room(self.layout, int(settings["obstacles"]))
         self.grounded = _grounded(layout_text(self.layout))
         self.oracle = Once(self.layout, self.grounded)
+        self.max_steps = max(MAX_STEPS, len(self.layout.cells))
 
     def result(self) -> Result:
         """Carry out all episodes, and tell what they came to."""
@@ -146,7 +154,7 @@ class Episodes:
         self.oracle.forget()
         replanning, strategy = self._strategies[pair[0], pair[1]]
         followed = strategy if wanted["follow"] == "strategy" else replanning
-        run = Robot(self.layout, self.grounded, followed, sight).run(episode)
+        run = Robot(self.layout, self.grounded, followed, sight, max_steps=self.max_steps).run(episode)
         for met in run.encounters:
             if met.affordance.on_route:
                 one = judged(self.oracle, strategy, met, followed=followed is strategy)
@@ -164,21 +172,27 @@ class Episodes:
             found.over.append(run.steps - best)
 
     @cached_property
+    def _learners(self) -> dict[tuple[str, str], PairLearner]:
+        """What has learnt each pair of trigger and goal."""
+        pairs = ((trigger, goal) for trigger in self.layout.triggers for goal in self.layout.goals)
+        learners = {pair: PairLearner(self.layout, self.grounded, *pair, seed=self.seed) for pair in pairs}
+        for learner in learners.values():
+            learner.learn()
+        return learners
+
+    @cached_property
     def _strategies(self) -> dict[tuple[str, str], tuple[Replanning, Strategy]]:
         """Replanning and the strategy that is judged, by the pair that they have learnt."""
-        pairs = ((trigger, goal) for trigger in self.layout.triggers for goal in self.layout.goals)
-        return {pair: self._learnt(pair) for pair in pairs}
+        return {pair: self._strategies_of(learner.learner) for pair, learner in self._learners.items()}
 
-    def _learnt(self, pair: tuple[str, str]) -> tuple[Replanning, Strategy]:
-        learner = PairLearner(self.layout, self.grounded, *pair, seed=self.seed)
-        learner.learn()
-        replanning = Replanning(self.oracle, learner.learner)
+    def _strategies_of(self, learner: MaxQ) -> tuple[Replanning, Strategy]:
+        replanning = Replanning(self.oracle, learner)
         match self.settings["strategy"]:
             case "local-rule":
-                return replanning, LocalRule(self.layout, learner.learner)
+                return replanning, LocalRule(self.layout, learner)
             case "value-sweep":
                 experience = _experience(layout_text(self.layout), self.seed)
-                return replanning, ValueSweep(self.layout, learner.learner, experience)
+                return replanning, ValueSweep(self.layout, learner, experience)
             case _:
                 return replanning, replanning
 
@@ -210,6 +224,7 @@ class Episodes:
             "asked": all_.asked,
             "boxed_in": ledger.boxed_in,
             "misread": _share(found.misread, found.looks),
+            "unlearnt": sum(int(learner.wrong_grids()[0]) for learner in self._learners.values()),
         }
         parts = {"subtask": _subtasks(self.grounded), "shape": ("cube", "sphere")}
         for by, names in parts.items():

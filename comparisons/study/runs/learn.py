@@ -6,21 +6,18 @@ from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from math import isfinite
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from comparisons.learn.line import Line, Measured
 from comparisons.learn.registry import Request, Run, StuckError, new_run
 from comparisons.study.kinds import Kind, Measure, Result
-from comparisons.study.runs.learn_problem import layout_of, problem, refuse_wrong, stored_values
+from comparisons.study.runs.learn_heat import heat_map
+from comparisons.study.runs.learn_problem import layout_of, problem, refuse_wrong, settle, stored_values
 from comparisons.study.runs.learn_settings import NAMES, ORACLE, files, settings_of, split, text
 from comparisons.study.spec import Value
-from hierarchy import GroundGraph
-from planners import flat_optimum
 from planners.option_critic.greedy import GreedyPolicy
-from worlds import Cell, Layout
-from worlds.layout_writing import layout_text
 
 MEASURES: Final = (
     Measure("steps_to_optimal", "environment steps until every start is optimal", "steps", "less"),
@@ -28,10 +25,16 @@ MEASURES: Final = (
     Measure("steps_to_level", "environment steps until the mean return is near the best", "steps", "less"),
     Measure("share_optimal", "share of the starts from which the policy is optimal at the end", "", "more"),
     Measure("share_ending", "share of the starts from which the policy surely ends", "", "more"),
-    Measure("mean_loss", "how much the mean return falls short of the best at the end", "reward", "less"),
-    Measure("mean_return", "mean return at the end", "reward", "more"),
+    Measure(
+        "mean_loss",
+        "how much the return falls short of the best at the end, the mean over all starts",
+        "reward",
+        "less",
+    ),
+    Measure("mean_return", "return at the end, the mean over all starts", "reward", "more"),
     Measure("steps", "environment steps of the whole run", "steps", None),
-    Measure("stored_values", "values that the learner's tables need", "values", "less"),
+    # Neither less nor more of them is better: a learner without tables has none, rather than too many.
+    Measure("stored_values", "values that the learner's tables need", "values"),
 )
 """What a run of learning measures."""
 
@@ -66,6 +69,9 @@ class Goals:
         The mean return short of the best that counts as near it.
     until
         What ends the run.
+    lasting
+        How long that must have lasted, as a multiple of the steps until then. Learning goes on where the
+        greedy policy is optimal, and often spoils it again.
     limit
         Steps after which an episode of evaluation is over; 0 for none.
     """
@@ -73,13 +79,16 @@ class Goals:
     line: Line
     loss: float
     until: str
+    lasting: float = 0.0
     limit: int = 0
 
     def measure(self, policy: GreedyPolicy) -> Measured:
-        """Return how near a policy comes."""
+        """Return how near a policy comes; no means where an episode never ends, nor is cut off."""
         measured = self.line.measure(policy)
         if not self.limit:
-            return measured
+            # Of the other starts alone they would look the better, the fewer those are.
+            endless = measured.share_ending < 1
+            return measured._replace(mean_return=np.nan, mean_loss=np.nan) if endless else measured
         returns = policy.returns_within(self.line.starts, self.limit)
         short = self.line.best - returns
         return measured._replace(mean_return=float(returns.mean()), mean_loss=float(short.mean()))
@@ -89,15 +98,16 @@ class Goals:
         return point.measured.share_optimal == 1
 
     def level(self, point: Point) -> bool:
-        """Return whether it ends from everywhere, unless cut off, and near enough to the best."""
-        ends = self.limit > 0 or point.measured.share_ending == 1
-        return ends and point.measured.mean_loss <= self.loss
+        """Return whether it comes near enough to the best."""
+        return point.measured.mean_loss <= self.loss
 
-    def over(self, point: Point) -> bool:
-        """Return whether there is nothing left to learn for."""
-        return (self.until == "optimal" and self.optimal(point)) or (
-            self.until == "level" and self.level(point)
-        )
+    def over(self, points: Sequence[Point]) -> bool:
+        """Return whether there is nothing left to learn for: it has come there, and that has lasted."""
+        if self.until == "end":
+            return False
+        reached = self.optimal if self.until == "optimal" else self.level
+        since = first_for_good([reached(point) for point in points])
+        return since is not None and points[-1].steps >= (1 + self.lasting) * points[since].steps
 
 
 def complete(given: Mapping[str, Value]) -> dict[str, Value]:
@@ -116,9 +126,8 @@ def complete(given: Mapping[str, Value]) -> dict[str, Value]:
     worlds.errors.UserError: starts: ...
     """
     settings = settings_of(given)
-    # Only what the graph and the world hang on: most combinations of a study have that in common.
-    names = ("graph", "world", "starts", "learner", "abstraction")
-    refuse_wrong(split({name: settings[name] for name in names}))
+    if not files(settings):  # what those hold is for `settle`
+        refuse_wrong(settings)
     return settings
 
 
@@ -148,7 +157,8 @@ def run(settings: Mapping[str, Value], seed: int) -> Result:
     asked = split(settings)
     grounded = problem(asked)
     line = Line.of(grounded)
-    goals = Goals(line, asked.tolerance * float(np.abs(line.best).mean()), asked.until, asked.limit)
+    near = asked.tolerance * float(np.abs(line.best).mean())
+    goals = Goals(line, near, asked.until, asked.lasting, asked.limit)
     layout = layout_of(asked, grounded)
     if asked.learner == ORACLE:
         points, learnt, stuck = [Point(0, 0, _perfect(line))], None, ""
@@ -157,7 +167,7 @@ def run(settings: Mapping[str, Value], seed: int) -> Result:
         learner = new_run(Request(asked.learner, grounded, seed, settings=own, steps=asked.steps))
         learning = _Learning(learner, goals)
         points, learnt, stuck = learning.points, learner.greedy(), learning.stuck
-    heat = {} if layout is None else _heat(layout, grounded, learnt)
+    heat = {} if layout is None else heat_map(layout, grounded, learnt)
     details = {**heat, "stuck": stuck} if stuck else heat
     measures = _measures(points, goals, stored_values(grounded, asked.learner), came_through=not stuck)
     return Result(measures, {"learning": _curve(points)}, details)
@@ -203,7 +213,7 @@ class _Learning:
                         raise StuckError(f"learning went astray: after {steps} steps {name} is {value}")
                 if self.learner.due() or steps >= total:
                     self._evaluate(steps)
-                    if self.goals.over(self.points[-1]):
+                    if self.goals.over(self.points):
                         return
 
     def _evaluate(self, steps: int) -> None:
@@ -247,54 +257,5 @@ def _known(value: float) -> float | None:
     return None if np.isnan(value) else float(value)
 
 
-def _heat(layout: Layout, grounded: GroundGraph, policy: GreedyPolicy | None) -> dict[str, Any]:
-    """Return steps and what they exceed the fewest by, from each cell, for the layout's own example.
-
-    None stands where the policy does not come to the end.
-    """
-    index, model = grounded.model.index, grounded.model
-    trigger, goal = layout.triggers[layout.trigger], layout.goals[layout.goal]
-    at = {cell: index.number((cell, trigger, goal, "closed")) for cell in _cells(layout, grounded)}
-    if not at:
-        return {}
-    states = np.array(list(at.values()), dtype=np.int64)
-    best = flat_optimum(model, grounded.nodes[grounded.root].terminal).value[states]
-    returns = best if policy is None else policy.returns(states)
-    return {
-        "heat": {
-            "layout": layout_text(layout),
-            "trigger": layout.trigger,
-            "goal": layout.goal,
-            "cells": [str(cell) for cell in at],
-            "steps": [float(-value) if np.isfinite(value) else None for value in returns],
-            "gaps": [float(gap) if np.isfinite(gap) else None for gap in best - returns],
-            "way": _way(layout, grounded, policy),
-        }
-    }
-
-
-def _way(layout: Layout, grounded: GroundGraph, policy: GreedyPolicy | None) -> list[str]:
-    """Return the cells that the policy passes in the layout's own example; none if it does not arrive."""
-    index, column = grounded.model.index, grounded.model.index.names.index("robot")
-    trigger, goal = layout.triggers[layout.trigger], layout.goals[layout.goal]
-    if policy is None or not grounded.model.is_deterministic:
-        return []
-    route = policy.route(index.number((layout.start, trigger, goal, "closed")))
-    if not route:
-        return []
-    state, _, action = route[-1]
-    states = [*(step[0] for step in route), int(grounded.model.successors[state, action])]
-    return [str(index.state(state)[column]) for state in states]
-
-
-def _cells(layout: Layout, grounded: GroundGraph) -> list[Cell]:
-    """Return the cells that an episode may begin in with the layout's own trigger and goal."""
-    trigger, goal = layout.triggers[layout.trigger], layout.goals[layout.goal]
-    index = grounded.model.index
-    begins = grounded.model.starts & ~grounded.nodes[grounded.root].terminal
-    cells = (cell for cell in layout.cells if cell not in layout.solid)
-    return [cell for cell in cells if begins[index.number((cell, trigger, goal, "closed"))]]
-
-
-LEARN: Final = Kind("learn", 1, MEASURES, complete, files, run)
+LEARN: Final = Kind("learn", 1, MEASURES, complete, files, run, settle)
 """The kind of run."""

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache
 from math import prod
+from posixpath import dirname, join, normpath
+from types import MappingProxyType
 
 import numpy as np
 
-from comparisons.study.runs.learn_settings import FLAT, LearnSettings
+from comparisons.study.kinds import ReadText
+from comparisons.study.runs.learn_settings import FLAT, LearnSettings, files, split
+from comparisons.study.spec import Value
 from hierarchy import GroundGraph, TaskGraph, ground
 from hierarchy.abstraction_counts import table_sizes
 from hierarchy.check import checked
 from hierarchy.grounding import GroundCall, Leaf
 from hierarchy.starts import beginning_where
-from hierarchy.text import load_graph, load_world
-from worlds import Layout, UserError, load_layout, suggest
+from hierarchy.text import LoadedGraph, TextWorld, load_graph, load_world, maze_world, parse_graph
+from hierarchy.text_nodes import read_yaml
+from hierarchy.text_worlds import MAZE_SUFFIX
+from worlds import Layout, UserError, load_layout, parse_layout, suggest
 
 
-def problem(settings: LearnSettings) -> GroundGraph:
+def problem(settings: LearnSettings, texts: Mapping[str, str] = MappingProxyType({})) -> GroundGraph:
     """Return the ground graph to learn on.
 
     The graph is checked as it is declared; what is then taken away from it may be unsafe.
+
+    Parameters
+    ----------
+    settings
+        What is asked for.
+    texts
+        Texts of files that it names. Others are read.
 
     Raises
     ------
@@ -38,9 +51,9 @@ def problem(settings: LearnSettings) -> GroundGraph:
     {'GotoTrigger': ('trigger',), 'GotoDoor': (), 'GotoGoal': ()}
     """
     with _about("world"):
-        world = load_world(settings.world) if settings.world else None
+        world = _world(settings.world, texts) if settings.world else None
     with _about("graph"):
-        graph, world = load_graph(settings.graph, world)
+        graph, world = _graph(settings.graph, texts, world)
         grounded = checked(graph, world.model())
     if settings.starts:
         with _about("starts"):
@@ -51,17 +64,74 @@ def problem(settings: LearnSettings) -> GroundGraph:
         grounded = _unabstracted(grounded)
     if settings.dropped:
         grounded = _without(grounded, settings.dropped)
-    if settings.pseudo_reward == "none":
-        untaught = tuple(replace(node, pseudo_reward=None) for node in grounded.nodes)
-        grounded = replace(grounded, nodes=untaught)
-    return grounded
+    return grounded if settings.pseudo_reward == "declared" else _untaught(grounded)
+
+
+def _world(name: str, texts: Mapping[str, str]) -> TextWorld:
+    return _maze(texts[name], name) if name in texts else load_world(name)
 
 
 @lru_cache(maxsize=64)
-def refuse_wrong(settings: LearnSettings) -> None:
+def _maze(text: str, name: str) -> TextWorld:
+    return maze_world(parse_layout(text, name), name)
+
+
+def _graph(name: str, texts: Mapping[str, str], world: TextWorld | None) -> LoadedGraph:
+    return parse_graph(texts[name], name, world) if name in texts else load_graph(name, world)
+
+
+def settle(settings: Mapping[str, Value], read: ReadText) -> dict[str, Value]:
+    """Return complete settings with the maze that a task graph's own file names as their world.
+
+    Raises
+    ------
+    UserError
+        If the files have not got what the settings name; the message begins with the setting's name.
+
+    Examples
+    --------
+    >>> from comparisons.study.runs.learn_settings import settings_of
+    >>> texts = {"mine/graph.yaml": "world: house.maze", "mine/house.maze": "name house"}
+    >>> settle(settings_of({"graph": "mine/graph.yaml"}), texts.__getitem__)
+    Traceback (most recent call last):
+        ...
+    worlds.errors.UserError: graph: mine/graph.yaml names the world house.maze: mine/house.maze: ...
+    """
+    named = files(settings)
+    if not named:
+        return dict(settings)
+    graph, world = str(settings["graph"]), str(settings["world"])
+    texts = {name: read(name) for name in (str(settings[setting]) for setting in named)}
+    if not world and (maze := _maze_of(texts[graph])):
+        world = normpath(join(dirname(graph), maze))
+        with _about(f"graph: {graph} names the world {maze}"):
+            texts[world] = read(world)
+            _maze(texts[world], world)  # what is wrong with it is told here
+    settled = {**settings, "world": world}
+    refuse_wrong(settled, tuple(texts.items()))
+    return settled
+
+
+@lru_cache(maxsize=64)
+def _maze_of(graph: str) -> str:
+    """Return the name of the maze's file that a task graph's text names; "" if it names none."""
+    try:
+        data = read_yaml(graph, "").data
+    except UserError:  # which is told when the graph is read for its world
+        return ""
+    named = data.get("world") if isinstance(data, dict) else None
+    return named if isinstance(named, str) and named.endswith(MAZE_SUFFIX) else ""
+
+
+def refuse_wrong(settings: Mapping[str, Value], texts: tuple[tuple[str, str], ...] = ()) -> None:
     """Refuse settings whose graph or world cannot be had, or has not got what they name.
 
-    Files are not looked for: where they lie is known only when a run begins.
+    Parameters
+    ----------
+    settings
+        Complete ones.
+    texts
+        Names and texts of the files among them.
 
     Raises
     ------
@@ -70,13 +140,27 @@ def refuse_wrong(settings: LearnSettings) -> None:
 
     Examples
     --------
-    >>> refuse_wrong(LearnSettings("two_rooms", abstraction="drop gaol"))
+    >>> from comparisons.study.runs.learn_settings import settings_of
+    >>> refuse_wrong(settings_of({"graph": "two_rooms", "abstraction": "drop gaol"}))
     Traceback (most recent call last):
         ...
     worlds.errors.UserError: abstraction: there is no state variable 'gaol'; did you mean 'goal'?
     """
-    if not settings.graph_is_a_file and not settings.world_is_a_file:
-        problem(settings)
+    # Only what the graph and the world hang on: most combinations of a study have that in common.
+    names = ("graph", "world", "starts", "learner", "abstraction", "pseudo_reward")
+    error = _wrong(split({name: settings[name] for name in names}), texts)
+    if error is not None:
+        raise UserError(str(error)) from error
+
+
+@lru_cache(maxsize=64)
+def _wrong(settings: LearnSettings, texts: tuple[tuple[str, str], ...]) -> UserError | None:
+    """Return what is wrong, rather than raise it, so that it is found once for all combinations."""
+    try:
+        problem(settings, dict(texts))
+    except UserError as error:
+        return error
+    return None
 
 
 def layout_of(settings: LearnSettings, grounded: GroundGraph) -> Layout | None:
@@ -179,3 +263,11 @@ def _without(grounded: GroundGraph, dropped: tuple[str, ...]) -> GroundGraph:
         grounded,
         nodes=tuple(replace(node, calls=tuple(map(stored, node.calls))) for node in grounded.nodes),
     )
+
+
+def _untaught(grounded: GroundGraph) -> GroundGraph:
+    """Return the graph without pseudo-rewards."""
+    if not any(node.pseudo_reward for node in grounded.nodes):
+        name = grounded.graph.name
+        raise UserError(f"pseudo_reward: task graph {name} has none; there is nothing to leave out")
+    return replace(grounded, nodes=tuple(replace(node, pseudo_reward=None) for node in grounded.nodes))

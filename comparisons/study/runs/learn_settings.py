@@ -10,7 +10,7 @@ from comparisons.learn.settings import Settings, learner_settings
 from comparisons.study.spec import Value
 from hierarchy.text import graph_names
 from hierarchy.text_worlds import MAZE_SUFFIX
-from planners.config_text import Count, Share, Steps, check_fields, read_settings
+from planners.config_text import Count, Share, Steps, Weight, check_fields, read_settings
 from worlds import UserError, suggest
 
 ORACLE: Final = "oracle"
@@ -24,6 +24,8 @@ FLAT: Final = (ORACLE, "flat-q", "flat-ppo", "flat-dqn")
 """The learners that go by no tasks but the root."""
 DROPPING: Final = ("maxq-0", "maxq-q")
 """The learners whose abstraction can be made unsafe."""
+UNTAUGHT: Final = ("maxq-0", *FLAT)
+"""The learners that read no pseudo-rewards."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,8 @@ class LearnSettings:
         Environment steps after which learning ends.
     until
         What else ends it: every start being optimal, the mean return being within the tolerance, or nothing.
+    lasting
+        How long that must have lasted to end it, as a multiple of the steps until then; 0 ends it at once.
     tolerance
         How far the mean return may be from the best to count as near it, as a share of the best's mean size.
     limit
@@ -71,6 +75,7 @@ class LearnSettings:
     learner: str = "maxq-0"
     steps: Count = 1_000_000
     until: Literal["optimal", "level", "end"] = "optimal"
+    lasting: Weight = 1.0
     tolerance: Share = 0.01
     limit: Steps = 0
     abstraction: str = "declared"
@@ -85,6 +90,15 @@ class LearnSettings:
             raise UserError(
                 f"abstraction: {self.abstraction!r} is not possible; "
                 "use declared, full, or drop and names of state variables, such as drop goal"
+            )
+        if self.abstraction == "full" and self.learner in FLAT:
+            raise UserError(
+                f"abstraction: the learner {self.learner} has no tasks to abstract in, and always sees all "
+                "state variables; leave it out for this learner"
+            )
+        if self.pseudo_reward == "none" and self.learner in UNTAUGHT:
+            raise UserError(
+                f"pseudo_reward: the learner {self.learner} reads none; leave it out for this learner"
             )
         if self.dropped and self.learner not in DROPPING:
             raise UserError(

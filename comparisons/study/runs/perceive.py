@@ -13,7 +13,7 @@ from comparisons.learnt import frame_backend
 from comparisons.outputs import untracked
 from comparisons.perception_study import Score, look, render_frames, score
 from comparisons.study.kinds import Kind, Measure, Result
-from comparisons.study.runs.settings import Setting, completed
+from comparisons.study.runs.settings import NO_CORRUPTION, Setting, check_corruption, completed
 from comparisons.study.spec import Value
 from perception.calibration import Reliability, reliability
 from perception.corruptions import CORRUPTIONS, SEVERITIES, corrupt
@@ -25,7 +25,6 @@ from perception.variation import CLEAN, Variation
 from worlds import UserError
 from worlds.camera import Camera
 
-NO_CORRUPTION: Final = "none"
 CAMOUFLAGE: Final = "camouflage"
 """A corruption of the scene: obstacles take on the floor's colour."""
 _MOST_KEPT: Final = 5000
@@ -41,7 +40,7 @@ _SETTINGS: Final = {
 }
 
 MEASURES: Final = (
-    Measure("accuracy", "share of frames whose likeliest label is the true one", "", "more"),
+    Measure("accuracy", "share of frames whose likeliest label is the true one", "", "more", LABELS),
     Measure("abstained", "share of frames on which the backend would rather not tell the shape"),
     Measure(
         "answered_accuracy",
@@ -72,8 +71,7 @@ def complete(given: Mapping[str, Value]) -> Mapping[str, Value]:
     worlds.errors.UserError: severity: 3 of no corruption; name a corruption, or give 0
     """
     settings = completed(_SETTINGS, given)
-    if settings["severity"] and settings["corruption"] == NO_CORRUPTION:
-        raise UserError(f"severity: {settings['severity']} of no corruption; name a corruption, or give 0")
+    check_corruption(settings)
     try:
         _backend(str(settings["backend"]))
     except UserError as error:
@@ -101,7 +99,7 @@ def run(settings: Mapping[str, Value], seed: int) -> Result:
     return Result(_measures(scored), {"reliability": columns}, {**details, "reliability": columns})
 
 
-PERCEIVE: Final = Kind("perceive", 1, MEASURES, complete, files, run)
+PERCEIVE: Final = Kind("perceive", 1, MEASURES, complete, files, run, last_seed=len(SPLITS["test"]) - 1)
 
 
 @cache

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from comparisons.study.spec import Value
 from worlds import UserError, suggest
+
+NO_CORRUPTION: Final = "none"
+"""The corruption that leaves frames as they are."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,32 @@ def completed(settings: Mapping[str, Setting], given: Mapping[str, Value]) -> di
         if name not in settings:
             raise UserError(f"{name}: there is no such setting; {suggest(name, settings)}")
     return {name: _checked(name, of, given.get(name, of.default)) for name, of in settings.items()}
+
+
+def check_corruption(settings: Mapping[str, Value]) -> None:
+    """Refuse a corruption without a severity, which spoils nothing, and a severity without a corruption.
+
+    Raises
+    ------
+    UserError
+        If there is but one of the two.
+
+    Examples
+    --------
+    >>> check_corruption({"corruption": "jpeg", "severity": 3})
+    >>> check_corruption({"corruption": "none", "severity": 3})
+    Traceback (most recent call last):
+        ...
+    worlds.errors.UserError: severity: 3 of no corruption; name a corruption, or give 0
+    """
+    corruption, severity = settings["corruption"], settings["severity"]
+    if severity and corruption == NO_CORRUPTION:
+        raise UserError(f"severity: {severity} of no corruption; name a corruption, or give 0")
+    if corruption != NO_CORRUPTION and not severity:
+        raise UserError(
+            f"severity: 0 of {corruption} leaves frames as they are; "
+            f"give 1 or more, or corruption {NO_CORRUPTION}"
+        )
 
 
 def _checked(name: str, of: Setting, value: Value) -> Value:

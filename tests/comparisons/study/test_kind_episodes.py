@@ -75,6 +75,7 @@ def meeting(strategy: Strategy, task: int, cell: str, belief: MazeState) -> Enco
         ({"layout": "two_room"}, "layout: there is no layout 'two_room'; did you mean 'two_rooms'?"),
         ({"perception": "houg"}, "perception: 'houg' is not possible; did you mean 'hough'?"),
         ({"severity": 2}, "severity: 2 of no corruption; name a corruption, or give 0"),
+        ({"corruption": "jpeg", "perception": "hough"}, "severity: 0 of jpeg leaves frames as they are"),
         ({"corruption": "jpeg", "severity": 2}, "corruption: 'jpeg' spoils frames, and perception 'truth'"),
     ],
 )
@@ -421,17 +422,32 @@ def test_no_obstacles_are_no_affordances() -> None:
     assert (measures["reached"], measures["steps_over_best"]) == (1.0, 0.0)
 
 
+@pytest.mark.slow
+def test_a_large_layout_has_time_and_tells_what_was_not_learnt(tmp_path: Path) -> None:
+    """Ways of more than a hundred steps are not cut off; 1,200 episodes a subtask leave grids unlearnt."""
+    path = tmp_path / "long.maze"
+    corridor = [" ".join([*"." * 59, ":" if row == 1 else "|", *"." * 59]) for row in range(3)]
+    rows = [row.split() for row in corridor]
+    rows[0][0], rows[1][60], rows[2][-1] = "T1", "D1", "G1"
+    text = "\n".join(" ".join(row) for row in rows)
+    path.write_text(f"name long\n\ngrid\n{text}\n\nstart 2,0\ntrigger T1\ngoal G1\n")
+    long = run(complete({"layout": str(path), "obstacles": 1, "episodes": 6}), 0)
+    assert long.measures["reached"] == 1
+    assert (long.measures["unlearnt"] or 0) > 0
+    assert run(complete({"obstacles": 1, "episodes": 2}), 0).measures["unlearnt"] == 0
+
+
 @pytest.mark.parametrize(
     ("name", "runs", "followed"),
-    [("local_rule", 720, "replanning"), ("replanning", 360, "strategy"), ("density", 360, "replanning")],
+    [("local_rule", 720, "replanning"), ("replanning", 360, "strategy"), ("density", 240, "replanning")],
 )
 def test_the_ready_studies_can_begin(name: str, runs: int, followed: str) -> None:
-    """Each compares all strategies, each run complete."""
+    """Each compares all strategies, or the two that fall short, and each run is complete."""
     study = load_study(EXAMPLES / f"{name}.yaml")
     assert (study.kind, study.runs) == ("episodes", runs)
     planned = study.expand()
     assert {str(one.spec.settings["follow"]) for one in planned} == {followed}
-    assert {one.levels["strategy"] for one in planned} == {"local-rule", "value-sweep", "replanning"}
+    assert {one.levels["strategy"] for one in planned} >= {"local-rule", "value-sweep"}
     assert all(complete(one.spec.settings) == one.spec.settings for one in planned[::40])
 
 

@@ -28,7 +28,7 @@ MAZE = "name small\n\ngrid\n. . : D1 G1\nT1 . | . .\n. . : D2 .\n\nstart 0,0\ntr
 FOLDER = Path(__file__).parents[3] / "examples/studies"
 STUDIES = (
     *("abstraction", "doors", "exploration", "gamma", "layout_size"),
-    *("learning_rate", "pseudo_reward", "taxi", "terminations"),
+    *("learners", "learning_rate", "pseudo_reward", "taxi", "taxi_tuning", "terminations"),
 )
 
 
@@ -50,9 +50,9 @@ def test_it_is_the_kind_of_its_name() -> None:
     assert kind("learn") is LEARN
 
 
-def test_a_run_ends_when_it_has_come_to_the_optimum() -> None:
+def test_a_run_may_end_as_soon_as_it_has_come_to_the_optimum() -> None:
     """The last point of its curve is the first one at which every start is optimal."""
-    result = run(graph="two_rooms", evaluate=20)
+    result = run(graph="two_rooms", evaluate=20, lasting=0)
     curve, measures = result.curves["learning"], result.measures
     assert curve["share_optimal"][-1] == 1
     assert all(share is not None and share < 1 for share in curve["share_optimal"][:-1])
@@ -63,10 +63,35 @@ def test_a_run_ends_when_it_has_come_to_the_optimum() -> None:
     assert set(measures) == {measure.name for measure in LEARN.measures}
 
 
+def test_by_default_a_run_ends_when_the_optimum_has_lasted() -> None:
+    """Here the first one does not last: a row has been optimal everywhere, and a later one is not."""
+    slow: Mapping[str, Any] = {"rate_falls": "geometric", "rate": 0.9, "rate_decay": 0.9, "rate_every": 40}
+    settings: Mapping[str, Any] = {
+        "graph": "two_rooms",
+        "gamma": 0.9,
+        "evaluate": 10,
+        "spacing": 0.05,
+        **slow,
+    }
+    hasty, sure = run(**settings, lasting=0), run(**settings)
+    first, steps = hasty.measures["steps_to_optimal"], sure.measures["steps_to_optimal"]
+    curve = sure.curves["learning"]
+    optimal = {at: share == 1 for at, share in zip(curve["steps"], curve["share_optimal"], strict=True)}
+    assert first is not None
+    assert steps is not None
+    assert optimal[first]
+    assert first < steps
+    assert not all(held for at, held in optimal.items() if first < (at or 0) < steps)
+    assert all(held for at, held in optimal.items() if (at or 0) >= steps)
+    *_, before, last = curve["steps"]
+    assert (before or 0) < 2 * steps <= (last or 0)
+
+
 def test_a_full_run_goes_the_same_way_and_on() -> None:
     """Until its steps are done; what it has reached for good, it reached at the same evaluation."""
     short, whole = (
-        run(graph="two_rooms", evaluate=20, steps=60_000, until=until) for until in ("optimal", "end")
+        run(graph="two_rooms", evaluate=20, steps=60_000, until=until, lasting=0)
+        for until in ("optimal", "end")
     )
     points = len(short.curves["learning"]["steps"])
     for name, column in short.curves["learning"].items():
@@ -85,6 +110,16 @@ def test_what_is_never_reached_is_none() -> None:
     assert result.measures["episodes_to_optimal"] is None
     assert result.measures["steps_to_level"] is None
     assert None in result.curves["learning"]["mean_loss"]
+
+
+def test_a_mean_over_starts_is_over_all_of_them() -> None:
+    """While episodes from some never end there is none; as soon as all end, there is one."""
+    curve = run(graph="two_rooms", evaluate=5, spacing=0, lasting=0).curves["learning"]
+    assert any(0 < share < 1 for share in curve["share_ending"] if share is not None)
+    for share, gained, lost in zip(
+        curve["share_ending"], curve["mean_return"], curve["mean_loss"], strict=True
+    ):
+        assert (gained is not None) == (lost is not None) == (share == 1)
 
 
 @given(held=st.lists(st.booleans(), max_size=12))
@@ -240,7 +275,13 @@ def test_numbers_that_are_none_any_more_are_told(monkeypatch: pytest.MonkeyPatch
 
 def test_where_there_is_chance_a_level_is_reached() -> None:
     """Within a share of the best's size; cut off, the mean is over all starts."""
-    settings: Mapping[str, Any] = {"graph": "taxi", "world": "taxi-rainy", "until": "level", "tolerance": 0.5}
+    settings: Mapping[str, Any] = {
+        "graph": "taxi",
+        "world": "taxi-rainy",
+        "until": "level",
+        "tolerance": 0.5,
+        "lasting": 0,
+    }
     exact, cut = run(**settings), run(**settings, limit=300)
     best = run(**{**settings, "learner": "oracle"}).measures["mean_return"]
     assert best is not None
@@ -354,6 +395,18 @@ def test_files_are_named_and_travel(small: str) -> None:
             "abstraction: the learner hsmq does not store its values call by call",
         ),
         (
+            {"graph": "two_rooms", "abstraction": "full", "learner": "flat-q"},
+            "abstraction: the learner flat-q has no tasks to abstract in",
+        ),
+        (
+            {"graph": "two_rooms", "pseudo_reward": "none"},
+            "pseudo_reward: the learner maxq-0 reads none; leave it out for this learner",
+        ),
+        (
+            {"graph": "two_rooms", "pseudo_reward": "none", "learner": "maxq-q"},
+            "pseudo_reward: task graph two_rooms has none; there is nothing to leave out",
+        ),
+        (
             {"graph": "two_rooms", "learner": "oracle", "gamma": 1},
             "gamma: the learner oracle has no such setting",
         ),
@@ -367,15 +420,17 @@ def test_what_cannot_be_is_refused(given: dict[str, Value], problem_told: str) -
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_the_ready_studies_could_begin(name: str) -> None:
-    """At least ten seeds, an answer, and a first run of each combination whose graph and world can be had."""
+    """An answer, seeds enough to rank, and what each combination learns on can be had."""
     study = load_study(FOLDER / f"{name}.yaml")
     assert study.name == name
     assert study.answer is not None
-    assert len(study.seeds) >= 10
+    assert len(study.seeds) >= 5
+    problems = set()
     for each in study.combinations:
         files = {setting: str(FOLDER / str(each.settings[setting])) for setting in LEARN.files(each.settings)}
-        settings = split({**each.settings, **files})
-        assert problem(settings).model.starts.any()
+        settings = {**each.settings, **files}
+        problems.add(split({name: settings[name] for name in ("graph", "world", "learner", "abstraction")}))
+    assert all(problem(settings).model.starts.any() for settings in problems)
 
 
 def test_no_ready_study_is_forgotten() -> None:

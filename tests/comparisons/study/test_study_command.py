@@ -124,6 +124,45 @@ def test_failures_end_with_status_one_and_are_told(capsys: pytest.CaptureFixture
     assert out.startswith("1 of 2 runs have a result, 1 failed\n")
 
 
+def test_an_export_of_a_part_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    """Runs without a result have no row, and the exit status tells it."""
+    affordant(capsys, "run", write(FAILING), "--out", "store", "--workers", "1")
+    code, out, err = affordant(capsys, "export", "store", "--out", "runs.csv")
+    assert (code, out.splitlines()) == (1, ["runs.csv", "runs-curves.csv"])
+    assert err == "1 of 2 runs have no result, and no row\n"
+    with Path("runs.csv").open() as table:
+        assert [row["level.task"] for row in csv.DictReader(table)] == ["draw"]
+
+
+def test_results_that_a_study_asks_for_no_more_are_explained(capsys: pytest.CaptureFixture[str]) -> None:
+    """Its file in the store may be changed: runs that stay are kept, and of others it is told why."""
+    affordant(capsys, "run", write(TEXT), "--out", "store", "--quick", "--workers", "1")
+    Path("store/study.yaml").write_text(TEXT.replace("30", "31"))
+    _, out, _ = affordant(capsys, "status", "store")
+    assert ["all", "2", "0", "0", "10"] in [line.split() for line in out.splitlines()]
+    assert re.search(
+        r"\n2 results are of no run of this study any more: \w{32} differs .* n \(30, now 3", out
+    )
+    code, out, _ = affordant(capsys, "resume", "store", "--workers", "1")
+    assert code == 0
+    assert "2 results in the store are of no run of this study any more: affordant study status store" in out
+
+
+@pytest.mark.parametrize(
+    "command", ["run", "resume", "status", "report", "export", "diff", "check", "schema"]
+)
+def test_a_command_s_help_explains_all_that_it_takes(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    """Each argument and option has words of its own beside its form."""
+    code, out, _ = affordant(capsys, command, "--help")
+    assert code == 0
+    taken = re.findall(r"^│ (?:\*  )? *(--[a-z-]+|[A-Z]+)\b(.*)│$", out, flags=re.MULTILINE)
+    assert len(taken) >= (command != "schema")
+    for name, words in taken:
+        assert re.search(r" {2}[A-Z][a-z]* [a-z]", words), name
+
+
 def test_results_that_differ_end_with_status_one(capsys: pytest.CaptureFixture[str]) -> None:
     """Stores of other seeds or other numbers are told apart run by run."""
     affordant(capsys, "run", write(TEXT), "--out", "one", "--quick", "--workers", "1")
