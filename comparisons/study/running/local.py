@@ -108,6 +108,8 @@ class LocalEngine:
     ) -> None:
         """End all workers, and what they are at."""
         for worker in self._workers:
+            worker.let_go()
+        for worker in self._workers:
             worker.end()
         self._workers.clear()
         if self._scratch is not None:

@@ -61,7 +61,7 @@ class Worker(Generic[T]):
         theirs.close()  # now the pipe ends when the worker does
         self.task: T | None = None
         self.up = self.begun = False
-        self._gone = False
+        self._gone = self._free = False
 
     @property
     def pid(self) -> int:
@@ -104,8 +104,16 @@ class Worker(Generic[T]):
             return None
         raise self._departure()
 
+    def let_go(self) -> None:
+        """Let it end by itself if it waits for a run, and give back what it has of the system, as semaphores."""
+        self._free = self.idle
+        if self._free:
+            self._pipe.close()
+
     def end(self) -> None:
         """End it, whatever it is at."""
+        if self._free:
+            self._process.join(_LAST_SECONDS)
         with _ONE_AT_A_TIME:
             self._process.kill()
             self._process.join()

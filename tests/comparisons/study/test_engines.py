@@ -217,6 +217,14 @@ def test_what_is_under_way_ends_with_the_engine(marks: Path, how: str) -> None:
     assert not any(alive(pid) for pid in pids)
 
 
+def test_a_worker_that_waits_may_give_back_what_it_holds(marks: Path) -> None:
+    """Such as semaphores of replay buffers, of which Python warns where a process is killed with them."""
+    with LocalEngine(1) as engine:
+        ended(engine, [spec(1, task="hold", mark=str(marks))])
+        assert not (marks / "given back").exists()
+    assert (marks / "given back").exists()
+
+
 def test_a_worker_knows_nothing_of_an_interrupt(tmp_path: Path) -> None:
     """Ctrl-C reaches every process of a terminal; what is to end then is the driver's to say."""
     worker: Worker[int] = Worker("local", tmp_path)
