@@ -105,7 +105,7 @@ class Worker(Generic[T]):
         raise self._departure()
 
     def let_go(self) -> None:
-        """Let it end by itself if it waits for a run, and give back what it has of the system, as semaphores."""
+        """Let it end by itself if it waits for a run, and so give back what it holds, such as semaphores."""
         self._free = self.idle
         if self._free:
             self._pipe.close()
