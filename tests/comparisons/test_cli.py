@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from os import getpid, kill
 from pathlib import Path
 
@@ -148,6 +149,15 @@ def test_a_reader_that_has_had_enough_ends_it_quietly() -> None:
     assert (command.returncode, told) == (141, b"")
 
 
+@pytest.fixture
+def _in_the_foreground() -> Iterator[None]:
+    """Let Ctrl-C through, which what a shell has started in the background ignores."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("_in_the_foreground")
 def test_a_command_that_is_stopped_ends_without_a_word(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
