@@ -110,7 +110,7 @@ def _write(found: Gathered, name: str, out: Path, track: Track) -> None:
         pictures[plate.name] = save_three(plate.figure, out / "figures", plate.name)
         if plate.numbers:
             _text(out / "figures" / f"{plate.name}.csv", numbers_csv(plate))
-    sentences, tables = _results(found, about)
+    sentences, folded, tables = _results(found, about)
     (out / "tables").mkdir()
     for title, table in tables.items():
         _text(out / "tables" / f"{title}.md", table.markdown())
@@ -119,6 +119,7 @@ def _write(found: Gathered, name: str, out: Path, track: Track) -> None:
         found,
         name,
         sentences=sentences,
+        folded=folded,
         tables=tables,
         plates=plates,
         pictures=pictures,
@@ -127,11 +128,11 @@ def _write(found: Gathered, name: str, out: Path, track: Track) -> None:
     _text(out / PAGE, page)
 
 
-def _results(found: Gathered, about: About) -> tuple[list[str], dict[str, Table]]:
-    """Return the answer's sentences, and the tables of results by their files' names."""
+def _results(found: Gathered, about: About) -> tuple[list[str], list[str], dict[str, Table]]:
+    """Return the answer's sentences, those folded away, and tables of results by their files' names."""
     study, absent = found.study, [*(run for run, _ in found.failures), *found.left]
     if not found.rows:
-        return ["There is no answer yet: no run has a result."], {}
+        return ["There is no answer yet: no run has a result."], [], {}
     measures = shown_measures(about, found.rows, _MEASURES)
     failed = [run for run, _ in found.failures]
     many: dict[str, Any] = {"statistic": about.statistic, "missing": absent, "failed": failed}
@@ -141,13 +142,14 @@ def _results(found: Gathered, about: About) -> tuple[list[str], dict[str, Table]
         each = [about.kind.measure(part) for part in parts]
         tables[_FOLDED] = study_table(found.rows, each, **many, caption="The same measure, part by part.")
     if study.answer is None:
-        return [
-            "The study file declares no answer; the table of results has all there is to compare."
-        ], tables
+        none = "The study file declares no answer; the table of results has all there is to compare."
+        return [none], [], tables
     answered = answers(study.answer, about.measure, found.rows, absent)
     tables["comparisons"] = comparisons_table(answered.told, answered.measure, "How the levels compare.")
-    sentences = [*answered.lead, *(one.sentence for one in answered.told)]
-    return [_sentence(words) for words in sentences], tables
+    first = [_sentence(words) for words in (*answered.caution, *answered.summary)]
+    pairs = [_sentence(one.sentence) for one in answered.told]
+    shown = 0 if answered.summary else _SENTENCES
+    return [*first, *pairs[:shown]], pairs[shown:], tables
 
 
 def render(
@@ -155,6 +157,7 @@ def render(
     name: str,
     *,
     sentences: Sequence[str],
+    folded: Sequence[str] = (),
     tables: Mapping[str, Table],
     plates: Sequence[Plate],
     pictures: Mapping[str, Picture],
@@ -168,8 +171,8 @@ def render(
         The study's runs.
     name
         What commands call the store.
-    sentences
-        The answer.
+    sentences, folded
+        The answer: what is read first, and each comparison where they are many.
     tables
         Of results, by their files' names.
     plates, pictures
@@ -201,8 +204,8 @@ def render(
         sections=(),
         replay=None,
         contents=_CONTENTS,
-        answers=sentences[:_SENTENCES],
-        more_answers=sentences[_SENTENCES:],
+        answers=sentences,
+        more_answers=folded,
         warnings=told,
         cards=_cards(found),
         ran=run_sentences(study),

@@ -24,15 +24,18 @@ class Answered:
 
     Parameters
     ----------
-    lead
-        Sentences that say what to know before, or sum the comparisons up; often none.
+    caution
+        Sentences that say what to know before; often none.
+    summary
+        Sentences that sum many comparisons up; none where there are few.
     told
         The comparisons.
     measure
         What they compare: the measure, or multiples of a task's size of it.
     """
 
-    lead: tuple[str, ...]
+    caution: tuple[str, ...]
+    summary: tuple[str, ...]
     told: tuple[Told, ...]
     measure: Measure
 
@@ -108,8 +111,7 @@ def answers(
             found.append(_Pair(within, level, sides, compare(other, base, asked.statistic)))
     told = _told(asked, found)
     mixed = warning(max((each.comparison.apart for each in told if each.comparison), default=1.0), shown)
-    lead = (*([mixed] if mixed else []), *summary(asked, shown, told, places))
-    return Answered(lead, told, shown)
+    return Answered((mixed,) if mixed else (), summary(asked, shown, told, places), told, shown)
 
 
 class _Pair(NamedTuple):

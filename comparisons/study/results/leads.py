@@ -58,7 +58,7 @@ def _trend(asked: Asked, measure: Measure, told: Sequence[Told], places: Sequenc
     if not parts:
         return ()
     about = f"the {CALLED[asked.statistic]} over {counted(min(seeds), 'seed')} of {article(measure)}"
-    return (f"From {factor} {labels[0]} to {labels[-1]}, {about} goes {'; '.join(parts)}.",)
+    return (f"From {factor} {labels[0]} to {labels[-1]}, {about} {'; '.join(parts)}.",)
 
 
 def _way(found: Sequence[Estimate | None], labels: Sequence[str], measure: Measure) -> str | None:
@@ -76,7 +76,9 @@ def _way(found: Sequence[Estimate | None], labels: Sequence[str], measure: Measu
         shown = number(value, measure)
         if shown not in (number(first.value, measure), number(last.value, measure)):
             beyond.append(f", {words} to {shown} at {label}")
-    return f"from {ends[0]} to {ends[1]}{''.join(beyond)}{',' * bool(beyond)}"
+    if ends[0] == ends[1] and not beyond:
+        return f"stays at {ends[0]}"
+    return f"goes from {ends[0]} to {ends[1]}{''.join(beyond)}{',' * bool(beyond)}"
 
 
 def _count(asked: Asked, measure: Measure, told: Sequence[Told], ranked: Sequence[Told]) -> str:
@@ -98,6 +100,8 @@ def _count(asked: Asked, measure: Measure, told: Sequence[Told], ranked: Sequenc
         ]
         parts.append(f"{asked.compare} {level} is {' and '.join(ways)}" if ways else "")
     told_ways = "; ".join(part for part in parts if part)
+    if all(each.comparison.powerless for each in ranked if each.comparison is not None):
+        told_ways = "so few cannot show any by this test"
     left = len(told) - len(ranked)
     unranked = f"; {left} more {'is' if left == 1 else 'are'} not ranked" if left else ""
     return f"{counts}{': ' if told_ways else ''}{told_ways}{unranked}."

@@ -59,19 +59,22 @@ def study_table(
     factors = list(next(iter([*rows, *absent])).levels) if rows or absent else []
     here = by_levels(rows, factors)
     gone, lost = by_levels(absent, factors), by_levels(broken, factors)
-    shown, few = [], False
+    shown, few, untold = [], False, False
     for levels in by_levels([*rows, *absent], factors):
         alike = here.get(levels, [])
         cells = []
         for measure in measures:
             found = estimate(samples_of(alike, measure), statistic)
             few |= found is not None and found.few
+            untold |= found is not None and found.untold > 0
             cells.append(_cell(found, measure))
         planned = len(alike) + len(gone.get(levels, []))
         seeds = str(len(alike)) if planned == len(alike) else f"{len(alike)} of {planned}"
         shown.append((*levels, *cells, seeds, str(len(lost.get(levels, [])))))
     heads = (*factors, *(measure.name.replace("_", " ") for measure in measures), "seeds", "failed")
-    return Table(heads, tuple(shown), caption, _note(measures, statistic, few), len(factors))
+    return Table(
+        heads, tuple(shown), caption, _note(measures, statistic, few=few, untold=untold), len(factors)
+    )
 
 
 def comparisons_table(
@@ -170,10 +173,11 @@ def _cell(found: Estimate | None, measure: Measure) -> str:
     return f"{text}, {found.untold} without" if found.untold else text
 
 
-def _note(measures: Sequence[Measure], statistic: str, few: bool) -> str:
+def _note(measures: Sequence[Measure], statistic: str, *, few: bool, untold: bool) -> str:
     """Return what the columns are."""
     about: Mapping[str, str] = {measure.name.replace("_", " "): measure.about for measure in measures}
     units = {measure.name.replace("_", " "): measure.unit for measure in measures}
     parts = [f"{name}: {text}" + f" ({units[name]})" * bool(units[name]) for name, text in about.items()]
     marks = f" {_FEW} fewer than {FEWEST_SEEDS} seeds: not to be ranked." if few else ""
+    marks += " Without: runs in which there was nothing of it to measure." * untold
     return f"Each is the {_CALLED[statistic]} over seeds with its 95 % interval. {'; '.join(parts)}.{marks}"

@@ -180,7 +180,7 @@ def test_a_level_without_any_result_is_told() -> None:
     assert told.sentence == (
         "nothing can be said of gamma 0.9 against gamma 1: no seed has both; 20 runs failed or not run yet."
     )
-    assert answers(Asked(), STEPS, []) == Answered((), (), STEPS)
+    assert answers(Asked(), STEPS, []) == Answered((), (), (), STEPS)
 
 
 def test_what_is_not_ranked_is_no_test() -> None:

@@ -224,6 +224,23 @@ def test_one_seed_is_not_ranked(tmp_path: Path) -> None:
     assert not (path.parent / "figures" / "improvement.svg").exists()
 
 
+def test_many_comparisons_are_summed_up_and_folded_away(tmp_path: Path) -> None:
+    """What sums them up is read first; each of them is there to unfold."""
+    text = TEXT.replace("vary:\n", "vary:\n  tie: [0.01, 0.02, 0.03, 0.04]\n").replace(
+        "against: 1}", "against: 1, within: [tie]}"
+    )
+    study, store = begun(tmp_path, text)
+    for run in study.expand():
+        store.save(ran(run))
+    path, _ = report_study(store.directory)
+    page = path.read_text()
+    folded = page.index("4 comparisons, one by one")
+    assert (
+        page.index("None of 4 comparisons with discount 1") < folded < page.index("Tie 0.01: no difference")
+    )
+    assert page.index("Tie 0.04: no difference") < page.index("</details>", folded)
+
+
 def test_a_study_without_answer_shows_its_table(tmp_path: Path) -> None:
     """Without an answer in the file there is a table of results and no comparison."""
     text = "\n".join(line for line in TEXT.splitlines() if not line.startswith("answer"))

@@ -39,12 +39,12 @@ def test_the_larger_world_decides_unless_numbers_are_normalised() -> None:
         "decide for all: give the answer normalise: against, or name the factor that makes them so under "
         "within."
     )
-    assert plain.lead == (warned,)
+    assert plain.caution == (warned,)
     assert comparisons_table(plain.told, plain.measure).note.endswith(warned)
 
     counted = answers(Asked(normalise="against"), STEPS, two_worlds())
     (told,) = counted.told
-    assert (counted.lead, told.comparison.apart) == ((), 1)
+    assert (counted.caution, told.comparison.apart) == ((), 1)
     assert told.comparison.ratio.value == pytest.approx((2 + 0.8) / 2, rel=0.03)
     assert told.comparison.ratio.low > 1
     assert told.comparison.ahead == 1

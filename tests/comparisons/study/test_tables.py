@@ -121,6 +121,7 @@ def test_shares_and_what_tells_nothing_in_the_main_table() -> None:
         rows(OPTIMAL, {"1": [0.9, 0.92, 0.94, 0.92, 0.9, None]}), [OPTIMAL], statistic="median"
     )
     assert table.rows == (("1", "92.0 % (90.0 to 94.0 %), 1 without", "6", "0"),)
+    assert table.note.endswith("Without: runs in which there was nothing of it to measure.")
 
 
 def test_the_comparisons_table() -> None:
