@@ -61,8 +61,8 @@ class Result:
     Parameters
     ----------
     measures
-        Numbers by name; None where there is nothing to tell: never reached, or never asked. A measure of the
-        kind that is left out counts as None; names with a dot, such as ``optimal.GotoDoor``, are its parts.
+        Numbers by name; None where there is nothing to tell: never reached, or never asked. What the run has
+        not got at all is left out. Names with a dot, such as ``optimal.GotoDoor``, are parts of a measure.
     curves
         Tables by name: columns of equal length by name, the first one the abscissa.
     details

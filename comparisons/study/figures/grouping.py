@@ -248,7 +248,7 @@ def axis_of(measure: Measure) -> str:
 
 
 def value_of(row: Row, name: str) -> float | None:
-    """Return a run's measure; one that it left out was never reached."""
+    """Return a run's measure; None also if it has not got it."""
     return row.result.measures.get(name)
 
 

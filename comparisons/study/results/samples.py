@@ -139,9 +139,9 @@ def samples_of(rows: Iterable[Row], measure: Measure, tasks: Sequence[str] = ())
                 )
             seen[row.seed] = row
             value = row.result.measures.get(measure.name)
-            number = instead if value is None else float(value)
+            number = instead if value is None and measure.name in row.result.measures else value
             if number is None:
                 untold += 1
             else:
-                numbers[row.seed] = number
+                numbers[row.seed] = float(number)
     return Samples(measure, {task: numbers for task, numbers in found.items() if numbers}, untold)

@@ -232,9 +232,10 @@ def _measures(
     optimal = first_for_good([came_through and goals.optimal(point) for point in points])
     level = first_for_good([came_through and goals.level(point) for point in points])
     last = points[-1]
+    episodes = None if optimal is None else points[optimal].episodes
     found: dict[str, float | None] = {
         "steps_to_optimal": None if optimal is None else points[optimal].steps,
-        "episodes_to_optimal": None if optimal is None else points[optimal].episodes,
+        **({} if last.episodes is None else {"episodes_to_optimal": episodes}),
         "steps_to_level": None if level is None else points[level].steps,
         **{name: _known(value) for name, value in last.measured._asdict().items()},
         "steps": last.steps,

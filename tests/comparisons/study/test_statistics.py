@@ -189,7 +189,7 @@ def test_what_has_no_better_is_not_ranked() -> None:
 
 
 def test_none_counts_by_what_it_means() -> None:
-    """Steps never reached are infinitely many; a share or a cost of nothing is left out and counted."""
+    """Steps never reached are infinitely many; a share of nothing, or what no run has, is left out and counted."""
     assert [worst(measure) for measure in (STEPS, RETURN, OPTIMAL, COST)] == [inf, -inf, None, None]
     # Learners without tables do not need infinitely large ones.
     assert worst(kind("learn").measure("stored_values")) is None
@@ -197,7 +197,7 @@ def test_none_counts_by_what_it_means() -> None:
         found = samples_of(rows(measure, {"1": [3, None]}), measure)
         assert (found.values.tolist(), found.untold) == (kept, 2 - len(kept))
     absent = samples_of(rows(COST, {"1": [3.0]}), STEPS)
-    assert absent.values.tolist() == [inf]
+    assert (absent.values.tolist(), absent.untold) == ([], 1)
 
 
 def test_tasks_keep_seeds_apart() -> None:

@@ -1,6 +1,7 @@
 """Tables of text, and the two that a study's report shows."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import pytest
@@ -8,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from study_rows import COST, OPTIMAL, STEPS, Asked, rows
 
+from comparisons.study.kinds import Measure, Result
 from comparisons.study.results.answers import answers
 from comparisons.study.results.summaries import comparisons_table, study_table
 from comparisons.study.results.tables import Table
@@ -122,6 +124,14 @@ def test_shares_and_what_tells_nothing_in_the_main_table() -> None:
     )
     assert table.rows == (("1", "92.0 % (90.0 to 94.0 %), 1 without", "6", "0"),)
     assert table.note.endswith("Without: runs in which there was nothing of it to measure.")
+
+
+def test_a_measure_that_runs_have_not_got_is_not_said_to_be_missed() -> None:
+    """None is never; a measure that is left out is nothing."""
+    episodes = Measure("episodes", "episodes until every start is optimal", "episodes", "less")
+    kept = [replace(row, result=Result({"episodes": None})) for row in rows(STEPS, {"tables": [1.0] * 5})]
+    table = study_table([*kept, *rows(STEPS, {"networks": [1.0] * 5})], [episodes])
+    assert [row[1] for row in table.rows] == ["never, 0 of 5 got there", DASH]
 
 
 def test_the_comparisons_table() -> None:
