@@ -189,7 +189,7 @@ def test_what_has_no_better_is_not_ranked() -> None:
 
 
 def test_none_counts_by_what_it_means() -> None:
-    """Steps never reached are infinitely many; a share of nothing, or what no run has, is left out and counted."""
+    """Steps never reached are infinitely many; a share of nothing, and what no run has, are left out."""
     assert [worst(measure) for measure in (STEPS, RETURN, OPTIMAL, COST)] == [inf, -inf, None, None]
     # Learners without tables do not need infinitely large ones.
     assert worst(kind("learn").measure("stored_values")) is None
