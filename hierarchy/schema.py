@@ -17,22 +17,11 @@ from pydantic import (
 )
 from pydantic.json_schema import WithJsonSchema
 
+from hierarchy.form_faults import form_fault
 from hierarchy.text_nodes import Document, Fault, Path
 from worlds import suggest
 
 _SCALAR: Final = {"type": ["string", "number", "boolean"]}
-_KEYS: Final = ("it is no mapping of keys to values", "write keys with values")
-_WORDS: Final = {  # pydantic's kinds of error in ours: the problem, and a mend
-    "list_type": ("it is no list", "write [first, second], or lines that begin with '- '"),
-    "dict_type": _KEYS,
-    "model_type": _KEYS,
-    "string_type": ("it is no plain text", "write words, not a list or keys"),
-    "float_parsing": ("it is no number", "write one, such as -10"),
-    "float_type": ("it is no number", "write one, such as -10"),
-    "finite_number": ("it is no finite number", "write one, such as -10"),
-    "too_short": ("it is empty", "give at least one"),
-    "string_too_short": ("it is empty", "write something there"),
-}
 
 Label = Annotated[str, WithJsonSchema(_SCALAR)]
 """A value by its label. Text that looks like a number or a truth value is a label all the same."""
@@ -188,21 +177,13 @@ def validated(document: Document) -> GraphText | list[Fault]:
 def _fault(document: Document, error: dict[str, Any]) -> Fault:
     """Return one of pydantic's errors in our words."""
     path: Path = tuple(part for part in error["loc"] if part != "[key]")
-    kind, last = error["type"], str(path[-1]) if path else ""
-    if kind == "extra_forbidden":
-        return document.fault(path, f"unknown key {last!r}", suggest(last, _known_keys(path), "keys:"))
-    if kind == "missing":
-        return document.fault(path[:-1], f"{last!r} is missing", f"add {last}: ...")
-    if kind == "value_error":
-        problem, _, mend = str(error["ctx"]["error"]).partition("; ")
-    elif kind == "dict_type" and len(path) == 5 and path[2] == "do":  # a binding, or a key gone wrong
-        problem = f"{last!r} is given {error['input']!r}, which binds no parameters"
+    if error["type"] == "dict_type" and len(path) == 5 and path[2] == "do":  # a binding, or a key gone wrong
+        last = str(path[-1])
         mend = suggest(last, ("when", "uses"), "keys besides the child:")
         if last in document.data["tasks"]:
             mend = f"write - {last}: {{PARAMETER: VALUE}}"
-    else:
-        problem, mend = _WORDS.get(kind, (error["msg"], "mend it"))
-    return document.fault(path, problem, mend)
+        return document.fault(path, f"{last!r} is given {error['input']!r}, which binds no parameters", mend)
+    return form_fault(document, path, error, _known_keys)
 
 
 def _known_keys(path: Path) -> list[str]:

@@ -29,6 +29,7 @@ from comparisons.study.declaring.written import (
     seed,
     written,
 )
+from hierarchy.form_faults import form_fault
 from hierarchy.text_nodes import Document, Fault, Path
 from worlds import suggest
 from worlds.errors import nearest
@@ -42,15 +43,6 @@ Normalise = Literal["none", "against"]
 
 _SCALAR: Final = {"type": ["string", "number", "boolean"], "minLength": 1}
 _STAND_INS: Final = {"study": "none", "question": "none", "kind": "none", "seeds": "1"}  # for what is wrong
-_KEYS: Final = ("it is no mapping of keys to values", "write keys with values")
-_WORDS: Final = {  # pydantic's kinds of error in ours: the problem, and a mend
-    "list_type": ("it is no list", "write [first, second], or lines that begin with '- '"),
-    "dict_type": _KEYS,
-    "model_type": _KEYS,
-    "string_type": ("it is no plain text", "write words, not a list or keys"),
-    "too_short": ("it is empty", "give at least one"),
-    "string_too_short": ("it is empty", "write something there"),
-}
 
 
 def _line(given: Any) -> Any:
@@ -233,25 +225,22 @@ def _fault(document: Document, error: dict[str, Any]) -> Fault:
     """Return one of pydantic's errors in our words."""
     path = _path(error["loc"])
     kind, last = error["type"], str(path[-1])
-    if kind == "extra_forbidden":
-        models: dict[str | int, type[BaseModel]] = {"answer": AnswerText, "seeds": SeedsText}
-        known = models.get(path[0], StudyText).model_fields
-        return document.fault(path, f"unknown key {last!r}", suggest(last, known, "keys:"))
-    if kind == "missing":
-        return document.fault(path[:-1], f"{last!r} is missing", f"add {last}: ...")
     if kind == "literal_error":
         mend = suggest(str(error["input"]), get_args(Normalise if last == "normalise" else Statistic))
         return document.fault(path, f"there is no {last} {error['input']!r}", mend)
-    if kind == "value_error":
-        problem, _, mend = str(error["ctx"]["error"]).partition("; ")
-    elif kind == "dict_type" and path[0] == "vary" and len(path) == 3:
-        problem = f"the label {last!r} stands for no settings"
+    if kind == "dict_type" and path[0] == "vary" and len(path) == 3:
         mend = f"write {last}: {{SETTING: VALUE}}, or give {path[1]} a list of values"
-    elif path[0] == "vary" and len(path) == 2:
-        problem, mend = "this is no list of levels", f"write {last}: [FIRST, SECOND], or labels with settings"
-    else:
-        problem, mend = _WORDS.get(kind, (error["msg"], "mend it"))
-    return document.fault(path, problem, mend)
+        return document.fault(path, f"the label {last!r} stands for no settings", mend)
+    if kind != "value_error" and path[0] == "vary" and len(path) == 2:
+        mend = f"write {last}: [FIRST, SECOND], or labels with settings"
+        return document.fault(path, "this is no list of levels", mend)
+    return form_fault(document, path, error, _known_keys)
+
+
+def _known_keys(path: Path) -> list[str]:
+    """Return the keys that may stand where an unknown one does."""
+    models: dict[str | int, type[BaseModel]] = {"answer": AnswerText, "seeds": SeedsText}
+    return list(models.get(path[0], StudyText).model_fields)
 
 
 def _path(loc: tuple[str | int, ...]) -> Path:

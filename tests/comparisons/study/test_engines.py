@@ -12,7 +12,7 @@ from pathlib import Path
 from threading import Barrier, Event, Thread
 
 import pytest
-from study_kinds import abort, installed, spec
+from study_kinds import abort, spec
 from study_processes import alive, kill, parent_of, under_way, wait_until
 
 from comparisons.study.running.engines import Engine
@@ -26,19 +26,7 @@ from worlds import UserError
 BAD = ("raise", "nan", "die", "exit", "hang")
 
 
-@pytest.fixture(autouse=True)
-def kind_there(tmp_path: Path) -> Iterator[None]:
-    """Let the tests' kind be found, here and by workers."""
-    with installed(tmp_path / "site"):
-        yield
-
-
-@pytest.fixture
-def marks(tmp_path: Path) -> Path:
-    """Return a folder in which runs tell that they are under way."""
-    folder = tmp_path / "marks"
-    folder.mkdir()
-    return folder
+pytestmark = pytest.mark.usefixtures("kind_there")
 
 
 def ended(engine: Engine, jobs: Iterable[RunSpec], limit: float | None = None) -> dict[int, Finished]:

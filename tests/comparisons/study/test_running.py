@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Any, Self
 
 import pytest
-from study_kinds import installed
 from study_processes import alive, kill, under_way, wait_until
 
 from comparisons.study.declaring.declaration import Study, parse_study
@@ -48,19 +47,7 @@ except UserError as error:
 """
 
 
-@pytest.fixture(autouse=True)
-def kind_there(tmp_path: Path) -> Iterator[None]:
-    """Let the tests' kind be found, here and by workers."""
-    with installed(tmp_path / "site"):
-        yield
-
-
-@pytest.fixture
-def marks(tmp_path: Path) -> Path:
-    """Return a folder in which runs tell that they are under way."""
-    folder = tmp_path / "marks"
-    folder.mkdir()
-    return folder
+pytestmark = pytest.mark.usefixtures("kind_there")
 
 
 def declared(seeds: int, levels: str = "{n: [1, 2]}", **settings: Any) -> str:

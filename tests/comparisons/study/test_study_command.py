@@ -6,11 +6,9 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from study_kinds import installed
 
 from comparisons.cli import main
 from comparisons.study.declaring.declaration import parse_study
@@ -33,12 +31,10 @@ vary: {task: [draw, raise]}
 
 
 @pytest.fixture(autouse=True)
-def kind_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Let the tests' kind be found, here and by workers, and work in an empty folder."""
-    with installed(tmp_path / "site"):
-        (tmp_path / "here").mkdir()
-        monkeypatch.chdir(tmp_path / "here")
-        yield
+def an_empty_folder(kind_there: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: ARG001
+    """Work in an empty folder, with the tests' kind there."""
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
 
 
 def affordant(capsys: pytest.CaptureFixture[str], *tokens: str) -> tuple[object, str, str]:

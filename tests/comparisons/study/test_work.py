@@ -3,14 +3,13 @@
 import json
 import os
 import subprocess
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from study_kinds import KIND, installed, spec
+from study_kinds import KIND, spec
 
 from comparisons.study.kinds import Result
 from comparisons.study.running.provenance import git_state
@@ -18,12 +17,7 @@ from comparisons.study.running.store import Store
 from comparisons.study.running.work import Broke, Ran, checked_result, work
 from comparisons.study.spec import RunSpec
 
-
-@pytest.fixture(autouse=True)
-def kind_there(tmp_path: Path) -> Iterator[None]:
-    """Let the tests' kind be found."""
-    with installed(tmp_path / "site"):
-        yield
+pytestmark = pytest.mark.usefixtures("kind_there")
 
 
 def ran(asked: RunSpec, scratch: Path | None = None) -> Ran:
